@@ -1,0 +1,62 @@
+"""Numba, set up once: a cache that can not go stale, and one decorator for every kernel.
+
+Numba's own ``cache=True`` looks only at the file a function stands in. When a compiled callee in *another* file
+changes, the stale caller is loaded and gives the old answer. So the cache lives in a folder named by a hash of every
+source that holds a kernel.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+_KEPT_CACHES = 4
+
+
+def _kernel_hash(package: Path) -> str:
+    """Hash the text of every module that compiles something."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if b"compiled" in text:
+            digest.update(source.relative_to(package).as_posix().encode() + b"\0" + text)
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> Path:
+    """Return this version's cache folder, under ``GECAR_CACHE_DIR`` or the user's cache folder."""
+    home = os.environ.get("GECAR_CACHE_DIR")
+    root = Path(home) if home else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gecar"
+    folder = root / f"kernels-{_kernel_hash(Path(__file__).parent)}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.touch()
+        for old in sorted(root.glob("kernels-*"), key=lambda f: f.stat().st_mtime)[:-_KEPT_CACHES]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        pass  # a read-only home: Numba then falls back to its own choice of folder
+    return folder
+
+
+numba.config.CACHE_DIR = str(_cache_folder())
+
+
+def compiled(function: F) -> F:
+    """Compile a kernel to machine code, cached between runs.
+
+    Kernels release the interpreter lock, never raise (division by zero gives inf or nan) and keep IEEE order of
+    operations, so that results are equal on every machine with the same versions.
+    """
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def inlined(function: F) -> F:
+    """Compile a small kernel that callers always inline: for the innermost loops only."""
+    return numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function)  # type: ignore[no-any-return]

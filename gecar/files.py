@@ -1,0 +1,65 @@
+"""Writing files whole or not at all, and reading TOML with errors that name the place."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from gecar.errors import InputError, expected
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file so that a reader, or a crash, sees either the old content or the new, never a part.
+
+    Raises
+    ------
+    OSError
+        If the folder can not be written or the disk is full; the old file is then untouched.
+    """
+    raw = content.encode() if isinstance(content, str) else content
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(raw)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def read_text(path: Path, what: str) -> str:
+    """Read a text file.
+
+    Raises
+    ------
+    InputError
+        If it is missing, a folder, unreadable or not UTF-8.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise expected(path, f"bytes that are not UTF-8 at {error.start}", f"{what} as UTF-8 text") from None
+    except FileNotFoundError:
+        raise expected(path, "no such file", what) from None
+    except OSError as error:
+        raise expected(path, error.strerror or "an unreadable file", what) from None
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        As `read_text`, or if it is not TOML; the message names the line.
+    """
+    try:
+        return tomllib.loads(read_text(path, what))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML: {error}") from None
