@@ -1,0 +1,127 @@
+"""pymunk from compiled code: the rigid body, walls and obstacles, stepped through pymunk's own C entry points.
+
+A pymunk step from Python costs several microseconds, nearly all of it Python. The library behind it offers plain C
+functions that take pointers and doubles: ``cpSpaceStep`` and two batch functions that read and write a body's fields
+through a buffer (``pymunk.batch`` shows their use). Kernels call them by address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pymunk
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from pymunk._chipmunk_cffi import ffi, lib  # the batch functions' addresses are nowhere else
+
+from gecar.compiled import compiled
+
+# Rows of the address table a kernel receives; all zero: no engine, the kernel moves the body itself.
+SPACE, BODY, STEP, READ, WRITE, REQUEST = range(6)
+NO_ENGINE = np.zeros(6, np.int64)
+NO_BUFFER = np.zeros(6)
+NO_COUNT = np.zeros(1, np.int32)
+
+_MOTION = lib.POSITION | lib.ANGLE | lib.VELOCITY | lib.ANGULAR_VELOCITY
+
+
+def _call(builder: Any, address: Any, arguments: Sequence[Any]) -> None:
+    kind = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
+    builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
+
+
+@intrinsic  # type: ignore[misc]
+def _call_pointer_double(typing: Any, function: Any, pointer: Any, number: Any) -> Any:  # noqa: ARG001
+    """Call ``void f(void *, double)`` at an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        _call(builder, arguments[0], arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.float64), generate
+
+
+@intrinsic  # type: ignore[misc]
+def _call_pointers(typing: Any, function: Any, first: Any, second: Any) -> Any:  # noqa: ARG001
+    """Call ``void f(void *, void *)`` at an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        _call(builder, arguments[0], arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), generate
+
+
+@compiled
+def engine_step(
+    s: Any, dt: float, engine: npt.NDArray[np.int64], buffer: npt.NDArray[np.float64], count: npt.NDArray[np.int32]
+) -> float:
+    """Let pymunk move the robot and everything it touches by one step.
+
+    Returns
+    -------
+    float
+        How far the body turned [rad].
+    """
+    before = s.heading
+    buffer[0], buffer[1], buffer[2] = s.x, s.y, s.heading
+    buffer[3], buffer[4], buffer[5] = s.vx, s.vy, s.yaw_rate
+    count[0] = 0
+    _call_pointers(engine[WRITE], engine[BODY], engine[REQUEST])
+    _call_pointer_double(engine[STEP], engine[SPACE], dt)
+    count[0] = 0
+    _call_pointers(engine[READ], engine[BODY], engine[REQUEST])
+    s.x, s.y, s.heading = buffer[0], buffer[1], buffer[2]
+    s.vx, s.vy, s.yaw_rate = buffer[3], buffer[4], buffer[5]
+    return s.heading - before  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A pymunk space with the robot in it, and what a kernel needs to step it.
+
+    Attributes
+    ----------
+    space, body
+        pymunk's own objects; the robot's body has its origin at the centre of mass.
+    addresses
+        Address table for kernels, shape (6,).
+    buffer, count
+        Where the batch functions put and find the body's fields, shapes (6,) and (1,).
+    """
+
+    space: pymunk.Space
+    body: pymunk.Body
+    addresses: npt.NDArray[np.int64]
+    buffer: npt.NDArray[np.float64]
+    count: npt.NDArray[np.int32]
+    keep_alive: tuple[Any, ...]
+
+
+def _address(pointer: Any) -> int:
+    return int(ffi.cast("uintptr_t", pointer))
+
+
+def make_engine(space: pymunk.Space, body: pymunk.Body) -> Engine:
+    """Wire a space and the robot's body to compiled code."""
+    buffer = np.zeros(6)
+    floats = ffi.new("pmFloatArray *")
+    ints = ffi.new("pmIntArray *")
+    held = ffi.from_buffer("cpFloat[]", buffer)
+    floats.num, floats.max, floats.arr = 0, len(buffer), held
+    request = ffi.new("pmBatchedData *")
+    request.fields, request.floatArray, request.intArray = _MOTION, floats, ints
+    count = np.frombuffer(ffi.buffer(ffi.addressof(floats, "num")), np.int32)
+    addresses = np.zeros(6, np.int64)
+    addresses[SPACE] = _address(space._space)  # noqa: SLF001 - pymunk has no public handle for C callers
+    addresses[BODY] = _address(body._body)  # noqa: SLF001
+    addresses[STEP] = _address(ffi.addressof(lib, "cpSpaceStep"))
+    addresses[READ] = _address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
+    addresses[WRITE] = _address(ffi.addressof(lib, "pmSpaceBodySetIteratorFuncBatched"))
+    addresses[REQUEST] = _address(request)
+    return Engine(space, body, addresses, buffer, count, (floats, ints, request, held))

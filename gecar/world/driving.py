@@ -1,0 +1,148 @@
+"""The compiled drive: program, sensors, motors and body, step by step, to an outcome."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import compiled
+from gecar.world.chipmunk import SPACE, engine_step
+from gecar.world.dynamics import drift, place, step, turn
+from gecar.world.interpreter import Eyes, Floor, look, run_program, see
+from gecar.world.sensing import RING, delayed
+
+# Outcome codes; `gecar.world.rollout.Outcome` names them.
+RUNNING, GOAL, OFF_COURSE, OUT_OF_TIME, STUCK, MISSED_CHECKPOINT = range(6)
+
+
+@compiled
+def advance(
+    n: int,
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    p: Any,
+    c: Any,
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+) -> None:
+    """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
+
+    ``commands``, shape (2, RING), remembers commands for the actuation delay. The cap on duty acts here.
+    """
+    left = min(max(left_duty, -p.duty_cap), p.duty_cap)
+    right = min(max(right_duty, -p.duty_cap), p.duty_cap)
+    if p.actuation_delay > 0.0:
+        if n == 0:
+            commands[:] = 0.0
+        commands[0, n & (RING - 1)] = left
+        commands[1, n & (RING - 1)] = right
+        left = delayed(commands[0], n, p.actuation_delay / c.dt)
+        right = delayed(commands[1], n, p.actuation_delay / c.dt)
+    step(s, left, right, p, c)
+    if engine[SPACE] != 0:
+        turn(s, engine_step(s, c.dt, engine, buffer, count) - 0.5 * c.dt * s.yaw_rate)
+    else:
+        drift(s, c)
+
+
+@compiled
+def _tile_at(x: float, y: float, floor: Floor) -> int:
+    """Return the index of the tile a point lies on, -1 outside the field."""
+    column = int(np.floor(x / floor.tile))
+    row = int(np.floor(y / floor.tile))
+    if column < 0 or row < 0 or column >= floor.columns or row >= floor.rows:
+        return -1
+    return row * floor.columns + column
+
+
+@compiled
+def _arrive(tile: int, passed: int, time: float, floor: Floor, arrival: npt.NDArray[np.float64]) -> tuple[int, int]:
+    """Return (outcome, tiles of the sequence passed) on entering a tile."""
+    if tile < 0 or not floor.drivable[tile]:
+        return OFF_COURSE, passed
+    last = floor.sequence.shape[0] - 1
+    if tile == floor.sequence[passed]:
+        arrival[passed] = time
+        return (GOAL if passed == last else RUNNING), passed + 1
+    if tile == floor.sequence[last]:
+        return MISSED_CHECKPOINT, passed
+    return RUNNING, passed
+
+
+@compiled
+def _sample(
+    trace: npt.NDArray[np.float64], sample: int, time: float, s: Any, k: Any, p: Any, floor: Floor
+) -> None:
+    trace[sample, 0] = time
+    trace[sample, 1] = s.x - p.com_ahead * s.cos
+    trace[sample, 2] = s.y - p.com_ahead * s.sin
+    trace[sample, 3] = s.heading
+    trace[sample, 4] = k.left_duty
+    trace[sample, 5] = k.right_duty
+    trace[sample, 6] = s.left_angle
+    trace[sample, 7] = s.right_angle
+    trace[sample, 8] = see(0, s, p, floor)
+    trace[sample, 9] = k.line
+
+
+@compiled
+def drive(
+    program: npt.NDArray[np.int32],
+    physics: npt.NDArray[Any],
+    derived: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    control: npt.NDArray[Any],
+    floor: Floor,
+    start: npt.NDArray[np.float64],
+    first: int,
+    last: int,
+    limit: int,
+    passed: int,
+    motor_noise: float,
+    eyes: Eyes,
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+    arrival: npt.NDArray[np.float64],
+    trace: npt.NDArray[np.float64],
+    every: int,
+) -> tuple[int, int, int]:
+    """Drive from step ``first`` until an outcome, or step ``last``.
+
+    Returns
+    -------
+    tuple
+        (outcome, step it ended at, tiles of the sequence passed).
+    """
+    p, c, s, k = physics[0], derived[0], state[0], control[0]
+    if first == 0:
+        place(s, p, start[0], start[1], start[2])
+        k.row = k.due_step = k.line = 0
+        k.until = -1
+        k.due_ms = k.left_duty = k.right_duty = 0.0
+    tile = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+    for n in range(first, last):
+        k.step = n
+        now = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+        outcome = RUNNING
+        if now != tile:
+            tile = now
+            outcome, passed = _arrive(tile, passed, n * c.dt, floor, arrival)
+        if outcome == RUNNING and n >= limit:
+            outcome = OUT_OF_TIME
+        if outcome == RUNNING:
+            look(n, s, p, c.dt, floor, eyes)
+            if not run_program(program, k, s, p, c.dt, floor, eyes, motor_noise):
+                outcome = STUCK
+        if trace.shape[0] > 0 and (n % every == 0 or outcome != RUNNING):
+            _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
+        if outcome != RUNNING:
+            return outcome, n, passed
+        advance(n, s, k.left_duty, k.right_duty, p, c, commands, engine, buffer, count)
+    return RUNNING, last, passed

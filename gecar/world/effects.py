@@ -1,0 +1,213 @@
+"""The catalogue: physics a simulation may have left out, each a group of parameters with a neutral value.
+
+Every parameter is a field of the kernel's `PHYSICS` record. At its neutral value an effect vanishes bit for bit, so
+the kernels hold all effects always; identification frees some and pins the rest, and what it finds is a robot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+DEG = math.pi / 180.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Attributes
+    ----------
+    field
+        Its field in the `PHYSICS` record (SI).
+    label
+        Its name with unit in robot files and verdicts (``angle_deg``).
+    unit
+        The unit it is shown in.
+    low, high
+        Bounds, in that unit.
+    neutral
+        Value at which it vanishes, in that unit; None: the robot's own constant.
+    worthwhile
+        Smallest change from neutral worth a name, in that unit; 0 where the parameter only shapes the effect.
+    si
+        SI value of one unit.
+    start
+        Where identification starts from, in that unit, when the neutral value itself says nothing.
+    """
+
+    field: str
+    label: str
+    unit: str
+    low: float
+    high: float
+    neutral: float | None
+    worthwhile: float
+    si: float = 1.0
+    start: float | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named group of parameters.
+
+    Attributes
+    ----------
+    id
+        The identifier reports and robot files use.
+    title
+        A few words a student understands.
+    parameters
+        The first one is the effect's size: at its neutral value the effect vanishes whatever the others are.
+    channels
+        Where it shows: ``motor`` (encoders), ``pose``, ``sensor`` (reflection), ``clock``.
+    signature
+        In what motion it shows.
+    source
+        Where the law and the bounds come from.
+    """
+
+    id: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    channels: tuple[str, ...]
+    signature: str
+    source: str
+
+
+_P = Parameter
+_LAW_MOTOR = "brushed DC motor with gearbox: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
+_EV3_FITS = "step fits of five EV3 motors: Coulomb 13-50 deg/s equivalent, forward and backward 5 % apart"
+_TYRE = "Coulomb friction circle; Pacejka, Tire and Vehicle Dynamics, ch. 1"
+_GEOMETRY = "odometry error model; Borenstein and Feng, IEEE T-RA 12(6), 1996"
+_SENSOR = "first-order sensor; white 50-98 %, black 2-10 % on real EV3 colour sensors"
+
+CATALOGUE: tuple[Effect, ...] = (
+    Effect("coulomb_friction", "dry friction in the gearbox",
+           (_P("coulomb_friction", "torque_nm", "N m", 0.0, 0.12, None, 0.002),),
+           ("motor",), "low speed, reversals, small duty", _LAW_MOTOR),
+    Effect("viscous_friction", "friction growing with speed",
+           (_P("viscous_friction", "coefficient_nms", "N m s/rad", 0.0, 0.03, 0.0, 0.0004),),
+           ("motor",), "high speed", _LAW_MOTOR),
+    Effect("static_friction", "breakaway friction above sliding friction",
+           (_P("static_friction", "extra_torque_nm", "N m", 0.0, 0.12, 0.0, 0.003),
+            _P("stribeck_speed", "speed_rad_s", "rad/s", 0.05, 8.0, 1.0, 0.0)),
+           ("motor",), "from rest; small duty never moves", _LAW_MOTOR + " (Stribeck curve, exponent 2)"),
+    Effect("friction_asymmetry", "friction or gain differs forward and backward",
+           (_P("friction_ratio", "friction_ratio", "-", -0.9, 0.9, 0.0, 0.08),
+            _P("direction_gain", "gain_ratio", "-", -0.3, 0.3, 0.0, 0.005)),
+           ("motor",), "sign of the speed", _EV3_FITS),
+    Effect("backlash", "backlash in the gears",
+           (_P("backlash", "angle_deg", "deg", 0.0, 25.0, 0.0, 0.8, DEG),),
+           ("motor", "pose"), "reversals: the encoder turns, the robot waits",
+           "dead-zone model of play: Nordin and Gutman, Automatica 38(10), 2002; EV3 gears: 3 deg (Benedettelli)"),
+    Effect("dead_band", "small duty gives no torque",
+           (_P("dead_band", "duty_pct", "%", 0.0, 40.0, 0.0, 1.0, 0.01),
+            _P("dead_band_offset", "offset_share", "-", 0.0, 1.0, 1.0, 0.0)),
+           ("motor",), "small duty", "dead zone of PWM drives; one EV3 motor did not move at 5 % duty"),
+    Effect("rotor_inertia", "the motors are slower or quicker to speed up",
+           (_P("inertia_scale", "scale", "-", 0.2, 4.0, 1.0, 0.05),),
+           ("motor",), "steps", "rests on an estimated acceleration of the EV3 motor: calibrate it"),
+    Effect("actuation_delay", "commands act late",
+           (_P("actuation_delay", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
+           ("motor",), "every command change", "pure delay between command and motor"),
+    Effect("command_slew", "commands ramp instead of stepping",
+           (_P("command_slew", "rate_pct_s", "%/s", 30.0, math.inf, math.inf, 0.0, 0.01, 500.0),),
+           ("motor",), "big steps", "rate limiter on duty"),
+    Effect("motor_gain_asymmetry", "one motor is stronger than the other",
+           (_P("gain_difference", "right_minus_left", "-", -0.4, 0.4, 0.0, 0.005),),
+           ("motor",), "straight runs curve; the encoders show it", _EV3_FITS),
+    Effect("supply_voltage", "the battery's level differs",
+           (_P("supply_scale", "scale", "-", 0.5, 1.3, 1.0, 0.005),),
+           ("motor",), "all speeds", "6.0-9.0 V over an EV3 battery's charge"),
+    Effect("battery_resistance", "the battery's voltage sags under load",
+           (_P("battery_resistance", "resistance_ohm", "ohm", 0.0, 4.0, None, 0.1),),
+           ("motor",), "acceleration, stall; both motors couple", "battery as a source behind a resistance"),
+    Effect("battery_drain", "the battery's voltage falls over time",
+           (_P("battery_drain", "rate_v_s", "V/s", -0.02, 0.3, 0.0, 0.004),),
+           ("motor",), "late against early", "linear fall of open-circuit voltage"),
+    Effect("torque_ripple", "torque varies with the shaft's angle",
+           (_P("ripple_amplitude", "amplitude_nm", "N m", 0.0, 0.1, 0.0, 0.003),
+            _P("ripple_cycles", "cycles_per_rev", "1/rev", 1.0, 48.0, 1.0, 0.0),
+            _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0)),
+           ("motor",), "periodic in the shaft's angle", "cogging and gear mesh, first harmonic"),
+    Effect("speed_limit", "firmware caps the speed",
+           (_P("speed_limit", "speed_rad_s", "rad/s", 1.0, math.inf, math.inf, 0.0, 1.0, 11.0),),
+           ("motor",), "high speed", "Motor.run caps the EV3 large motor at 800 deg/s"),
+    Effect("wheel_radius", "the wheels' rolling radius differs",
+           (_P("radius_scale", "scale", "-", 0.7, 1.3, 1.0, 0.01),),
+           ("pose",), "pose against encoders, straight", _GEOMETRY),
+    Effect("wheel_radius_difference", "one wheel is larger",
+           (_P("radius_difference", "right_minus_left", "-", -0.2, 0.2, 0.0, 0.005),),
+           ("pose",), "the path curves while the encoders agree", _GEOMETRY),
+    Effect("track_width", "the effective track differs",
+           (_P("track_scale", "scale", "-", 0.7, 1.4, 1.0, 0.01),),
+           ("pose",), "pose against encoders, turning", _GEOMETRY),
+    Effect("tyre_friction", "the tyres grip less, or more",
+           (_P("tyre_friction", "coefficient", "-", 0.03, 1.5, None, 0.15),),
+           ("pose",), "hard acceleration, fast turns", _TYRE),
+    Effect("slippery_patch", "grip is lost in one place on the floor",
+           (_P("patch_radius", "radius_m", "m", 0.0, 0.6, 0.0, 0.05),
+            _P("patch_x", "x_m", "m", -5.0, 5.0, 0.0, 0.0),
+            _P("patch_y", "y_m", "m", -5.0, 5.0, 0.0, 0.0),
+            _P("patch_friction", "coefficient", "-", 0.01, 0.6, 0.1, 0.0)),
+           ("pose",), "a place on the map", _TYRE),
+    Effect("caster_drag", "the caster drags",
+           (_P("caster_friction", "coefficient", "-", 0.0, 1.5, 0.0, 0.05),),
+           ("pose", "motor"), "constant drag, turning", "Coulomb friction at the caster's contact"),
+    Effect("rolling_resistance", "the tyres resist rolling",
+           (_P("rolling_resistance", "coefficient", "-", 0.0, 0.3, 0.0, 0.01),),
+           ("motor", "pose"), "constant drag", "torque = coefficient x load x radius"),
+    Effect("floor_tilt", "the floor is not level",
+           (_P("tilt_x", "x_rad", "rad", -0.25, 0.25, 0.0, 0.004),
+            _P("tilt_y", "y_rad", "rad", -0.25, 0.25, 0.0, 0.004)),
+           ("pose", "motor"), "depends on the heading", "gravity's component along the floor, positive along +x, +y"),
+    Effect("load_transfer", "the centre of mass is higher or lower",
+           (_P("com_height", "height_m", "m", 0.0, 0.15, None, 0.01),),
+           ("pose",), "hard acceleration with slip", "quasi-static load transfer"),
+    Effect("com_offset", "the centre of mass is further ahead or behind",
+           (_P("com_ahead", "ahead_m", "m", -0.084, 0.0, None, 0.004),),
+           ("pose",), "turns", "rigid body on two wheels and a caster"),
+    Effect("sensor_lag", "the colour sensor answers gradually",
+           (_P("sensor_lag", "time_constant_s", "s", 0.0, 0.3, 0.0, 0.005),),
+           ("sensor",), "line edges", _SENSOR),
+    Effect("sensor_delay", "the colour sensor answers late",
+           (_P("sensor_delay", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
+           ("sensor",), "line edges", _SENSOR),
+    Effect("sensor_gain", "white and black read otherwise",
+           (_P("sensor_gain", "gain", "-", 0.2, 2.0, 1.0, 0.02),
+            _P("sensor_offset", "offset_pct", "%", -40.0, 40.0, 0.0, 1.0)),
+           ("sensor",), "level on white and black", _SENSOR),
+    Effect("sensor_position", "the sensor is mounted elsewhere",
+           (_P("sensor_ahead", "ahead_m", "m", 0.0, 0.16, None, 0.0015),
+            _P("sensor_left", "left_m", "m", -0.08, 0.08, None, 0.0015)),
+           ("sensor",), "edges come early or late", _SENSOR),
+    Effect("spot_size", "the sensor sees a larger or smaller spot",
+           (_P("spot_diameter", "diameter_m", "m", 0.001, 0.05, None, 0.002),),
+           ("sensor",), "width of edges", _SENSOR),
+    Effect("line_shift", "the course lies elsewhere than drawn",
+           (_P("line_dx", "dx_m", "m", -0.12, 0.12, 0.0, 0.002),
+            _P("line_dy", "dy_m", "m", -0.12, 0.12, 0.0, 0.002),
+            _P("line_angle", "angle_rad", "rad", -0.1, 0.1, 0.0, 0.002)),
+           ("sensor",), "a place on the map", "rigid displacement of the printed course about the field's origin"),
+    Effect("clock_skew", "the log's clock runs fast or slow",
+           (_P("clock_skew", "rate", "-", -0.08, 0.08, 0.0, 0.002),),
+           ("clock",), "grows with time", "log time = true time x (1 + rate)"),
+    Effect("pose_delay", "camera poses are late",
+           (_P("pose_delay", "time_s", "s", -0.1, 0.3, 0.0, 0.005),),
+           ("pose", "clock"), "all motion, in the pose only", "pure delay between motion and logged pose"),
+)  # fmt: skip
+
+BY_ID = {effect.id: effect for effect in CATALOGUE}
+
+# The robot's own constants that are no catalogue effect of their own.
+_CONSTANTS = (
+    "mass", "yaw_inertia", "track_width", "wheel_radius", "caster_ahead",
+    "torque_constant", "back_emf_constant", "resistance", "inertia",
+    "voltage", "duty_cap", "regulated", "white", "black", "side_sensor_left",
+)  # fmt: skip
+
+PHYSICS_FIELDS = _CONSTANTS + tuple(p.field for effect in CATALOGUE for p in effect.parameters)
+PHYSICS = np.dtype([(field, np.float64) for field in PHYSICS_FIELDS])

@@ -1,0 +1,247 @@
+"""The robot: constants of a two-wheel EV3 with a caster and a colour sensor, read from a TOML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from gecar.errors import InputError, expected
+from gecar.files import read_toml, write_whole
+from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS, Parameter
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Percent = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class Body(_Section):
+    """Rigid body: masses [kg, kg m^2] and lengths [m], ahead and left of the axle's centre."""
+
+    mass: Positive
+    yaw_inertia: Positive
+    com_ahead: Finite
+    com_height: NotNegative
+    track_width: Positive
+    wheel_radius: Positive
+    caster_ahead: Finite
+    length: Positive
+    width: Positive
+
+    @model_validator(mode="after")
+    def _stands(self) -> Body:
+        share = self.com_ahead / self.caster_ahead if self.caster_ahead else -1.0
+        if not 0.0 <= share < 1.0:
+            raise ValueError("a centre of mass between the axle and the caster (com_ahead / caster_ahead in [0, 1))")
+        return self
+
+
+class Motor(_Section):
+    """DC motor with gearbox, at the output shaft [N m/A, V s/rad, ohm, kg m^2, N m, rad]."""
+
+    torque_constant: Positive
+    back_emf_constant: Positive
+    resistance: Positive
+    inertia: Positive
+    coulomb_friction: NotNegative
+    backlash: NotNegative = 0.0
+
+
+class Battery(_Section):
+    """Voltage source [V] behind a resistance [ohm]."""
+
+    voltage: Positive
+    resistance: NotNegative = 0.0
+
+
+class Drive(_Section):
+    """How commands become voltage: the cap on duty, and open loop ("duty") or regulated ("speed")."""
+
+    duty_cap: Annotated[float, Field(gt=0, le=1)] = 1.0
+    mode: Annotated[str, Field(pattern="^(duty|speed)$")] = "duty"
+
+
+class Tyre(_Section):
+    """Coulomb coefficient of each wheel's friction circle."""
+
+    friction: NotNegative
+
+
+class ColourSensor(_Section):
+    """Reflected-light sensor: place [m], spot [m], readings on bare floor and on the line [%].
+
+    ``side_left`` is how far the left and right sensors, where a grammar uses them, sit beside this one.
+    """
+
+    ahead: Finite
+    left: Finite = 0.0
+    spot_diameter: Positive
+    white: Percent = 100.0
+    black: Percent = 0.0
+    side_left: Finite = 0.03
+
+
+class Robot(_Section):
+    """A robot: its constants, and the catalogue effects it has.
+
+    ``effects`` maps an effect's id to its parameters by label, as in
+    ``[effects.backlash]`` / ``angle_deg = 5.6``.
+    """
+
+    name: str
+    body: Body
+    motor: Motor
+    battery: Battery
+    drive: Drive
+    tyre: Tyre
+    colour_sensor: ColourSensor
+    effects: Mapping[str, Mapping[str, float]] = {}
+
+    @model_validator(mode="after")
+    def _known_effects(self) -> Robot:
+        for effect_id, values in self.effects.items():
+            _check_effect(effect_id, values)
+        return self
+
+    @property
+    def physics(self) -> npt.NDArray[np.void]:
+        """The kernel's record of all constants and effects, dtype `PHYSICS`, shape (1,); SI."""
+        record = np.zeros(1, PHYSICS)
+        own = self._own_constants()
+        for effect in CATALOGUE:
+            for p in effect.parameters:
+                if p.neutral is not None:
+                    own.setdefault(p.field, p.neutral * p.si)
+        for effect_id, values in self.effects.items():
+            labels = {p.label: p for p in BY_ID[effect_id].parameters}
+            own.update({labels[label].field: value * labels[label].si for label, value in values.items()})
+        for field in PHYSICS.names or ():
+            record[field] = own[field]
+        return record
+
+    def _own_constants(self) -> dict[str, float]:
+        own: dict[str, float] = {**self.body.model_dump(), **self.motor.model_dump()}
+        own["voltage"] = self.battery.voltage
+        own["battery_resistance"] = self.battery.resistance
+        own["duty_cap"] = self.drive.duty_cap
+        own["regulated"] = 1.0 if self.drive.mode == "speed" else 0.0
+        own["tyre_friction"] = self.tyre.friction
+        sensor = self.colour_sensor
+        own |= {"sensor_ahead": sensor.ahead, "sensor_left": sensor.left, "spot_diameter": sensor.spot_diameter}
+        own |= {"white": sensor.white, "black": sensor.black, "side_sensor_left": sensor.side_left}
+        return own
+
+    def nominal(self, parameter: Parameter) -> float:
+        """Return a parameter's neutral value for this robot, in the parameter's unit."""
+        if parameter.neutral is not None:
+            return parameter.neutral
+        return self._own_constants()[parameter.field] / parameter.si
+
+    def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Robot:
+        """Return this robot with effects added or replaced.
+
+        Raises
+        ------
+        InputError
+            If an effect or label is unknown, or a value out of bounds.
+        """
+        for effect_id, values in effects.items():
+            try:
+                _check_effect(effect_id, values)
+            except ValueError as error:
+                raise InputError(f"effect {effect_id}: {error}") from None
+        return self.model_copy(update={"effects": {**self.effects, **effects}})
+
+
+def _check_effect(effect_id: str, values: Mapping[str, float]) -> None:
+    if effect_id not in BY_ID:
+        raise ValueError(f"found effect '{effect_id}', expected one of the catalogue: {', '.join(BY_ID)}")
+    labels = {p.label: p for p in BY_ID[effect_id].parameters}
+    for label, value in values.items():
+        if label not in labels:
+            raise ValueError(f"found '{label}' in effect {effect_id}, expected one of {', '.join(labels)}")
+        p = labels[label]
+        if math.isnan(value) or not p.low <= value <= p.high:
+            raise ValueError(f"found {effect_id}.{label} = {value:g}, expected {p.low:g} to {p.high:g} {p.unit}")
+
+
+def robot_from(table: Mapping[str, Any], where: str | Path) -> Robot:
+    """Make a robot from a parsed TOML table.
+
+    Raises
+    ------
+    InputError
+        If a field is missing, unknown or out of range; names the file and field.
+    """
+    try:
+        return Robot.model_validate(table)
+    except ValidationError as error:
+        raise _first_fault(error, where) from None
+
+
+def _first_fault(error: ValidationError, where: str | Path) -> InputError:
+    fault = error.errors()[0]
+    place = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "missing":
+        return expected(f"{where}, {place}", "nothing", "a value")
+    if fault["type"] == "extra_forbidden":
+        return expected(f"{where}, {place}", "an unknown field", "one of the fields of a robot file")
+    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if message.startswith("found "):
+        return InputError(f"{where}: {message}")
+    found = fault["input"] if not isinstance(fault["input"], dict) else "other values"
+    return expected(f"{where}, {place}" if place else where, found, message)
+
+
+def read_robot(path: Path) -> Robot:
+    """Read a robot file (TOML, SI units).
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not TOML, or a field is wrong.
+    """
+    return robot_from(read_toml(path, "a robot file"), path)
+
+
+def load_robot(name_or_path: str | Path) -> Robot:
+    """Load a robot by file, or by the name of one that ships with gecar (``ev3``).
+
+    Raises
+    ------
+    InputError
+        If there is no such robot, or its file is wrong.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or path.is_file():
+        return read_robot(path)
+    shipped = Path(__file__).parent / f"{name_or_path}.toml"
+    if not shipped.is_file():
+        raise expected("--robot", f"'{name_or_path}'", "a robot file (.toml) or 'ev3'")
+    return read_robot(shipped)
+
+
+def write_robot(robot: Robot, path: Path) -> None:
+    """Write a robot file that `read_robot` reads back to an equal robot."""
+    lines = [f"name = {_toml(robot.name)}"]
+    sections = robot.model_dump(exclude={"name", "effects"})
+    sections |= {f"effects.{effect_id}": dict(values) for effect_id, values in robot.effects.items()}
+    for section, fields in sections.items():
+        lines += ["", f"[{section}]", *(f"{field} = {_toml(value)}" for field, value in fields.items())]
+    write_whole(path, "\n".join(lines) + "\n")
+
+
+def _toml(value: float | str) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return repr(float(value))

@@ -1,0 +1,278 @@
+"""Drive a program over a course: from opcodes to an outcome, and to a trace where one is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.errors import expected
+from gecar.language.opcodes import TEST
+from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.course import Course
+from gecar.world.driving import drive
+from gecar.world.dynamics import DERIVED, STATE, derive
+from gecar.world.interpreter import CONTROL, Eyes, Floor
+from gecar.world.robot import Robot
+from gecar.world.sensing import RING
+from gecar.world.space import build_engine
+
+STEP_S = 0.002  # benchmarks/convergence.py shows what halving it moves
+TRACE_S = 0.01
+TRACE_COLUMNS = (
+    "t_s", "x_m", "y_m", "heading_rad", "left_duty", "right_duty", "left_angle_rad", "right_angle_rad",
+    "reflection_pct", "line",
+)  # fmt: skip
+
+
+class Outcome(IntEnum):
+    """How a drive ended."""
+
+    RUNNING = 0
+    GOAL = 1
+    OFF_COURSE = 2
+    OUT_OF_TIME = 3
+    STUCK = 4
+    MISSED_CHECKPOINT = 5
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in words."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Outcome.RUNNING: "is still driving",
+    Outcome.GOAL: "reached GOAL through all checkpoints",
+    Outcome.OFF_COURSE: "left the course",
+    Outcome.OUT_OF_TIME: "ran out of time",
+    Outcome.STUCK: "is stuck in a program that takes no time",
+    Outcome.MISSED_CHECKPOINT: "entered GOAL with a checkpoint missing",
+}
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise on request.
+
+    Attributes
+    ----------
+    sensor_pct
+        Standard deviation of each colour sensor reading [%].
+    motor_share
+        Standard deviation of each command's strength, as a share of it.
+    """
+
+    sensor_pct: float = 0.0
+    motor_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("sensor noise", self.sensor_pct), ("motor noise", self.motor_share)):
+            if not 0.0 <= value < np.inf:
+                raise expected(name, value, "a number of 0 or more")
+
+
+@dataclass(frozen=True)
+class World:
+    """A robot on a course, and how finely it is simulated.
+
+    Attributes
+    ----------
+    robot, course
+        Who drives, and where.
+    step_s
+        Step [s]; kernels hold 0.1 to 10 ms.
+    time_limit_s
+        When a drive ends without GOAL [s].
+    noise
+        Noise of sensor and motors.
+    engine
+        ``"pymunk"``: pymunk moves the body and what it touches. ``"inline"``: the same update, written in the
+        kernel; only for courses with nothing to touch. ``"auto"``: inline where that is possible.
+    """
+
+    robot: Robot
+    course: Course
+    step_s: float = STEP_S
+    time_limit_s: float = 60.0
+    noise: Noise = field(default_factory=Noise)
+    engine: str = "auto"
+
+    def __post_init__(self) -> None:
+        if not 0.0001 <= self.step_s <= 0.01:
+            raise expected("step", f"{self.step_s} s", "0.0001 to 0.01 s")
+        if not 0.0 < self.time_limit_s <= 3600.0:
+            raise expected("time limit", f"{self.time_limit_s} s", "a time of at most 3600 s")
+        if self.engine not in ("auto", "inline", "pymunk"):
+            raise expected("engine", repr(self.engine), "auto, inline or pymunk")
+        if self.engine == "inline" and self.has_contacts:
+            raise expected("engine", "inline", "pymunk, for a course with walls or obstacles")
+
+    @property
+    def has_contacts(self) -> bool:
+        """Whether the course has anything to touch."""
+        return len(self.course.walls) > 0 or len(self.course.obstacles) > 0
+
+    @property
+    def uses_pymunk(self) -> bool:
+        """Whether pymunk moves the body."""
+        return self.engine == "pymunk" or (self.engine == "auto" and self.has_contacts)
+
+    @property
+    def floor(self) -> Floor:
+        """What kernels know of the course."""
+        course = self.course
+        pitch = course.pitch_m
+        return Floor(
+            course.raster(pitch),
+            pitch,
+            course.tile_size_m,
+            course.columns,
+            course.rows,
+            course.drivable,
+            course.sequence,
+        )
+
+    @property
+    def start(self) -> npt.NDArray[np.float64]:
+        """Start pose of the axle's centre [m, m, rad], shape (3,)."""
+        return np.array([self.course.start.x_m, self.course.start.y_m, self.course.start.heading_rad])
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What came of a program.
+
+    Attributes
+    ----------
+    outcome
+        How it ended.
+    time_s
+        When it ended [s]; with `Outcome.GOAL` the time to GOAL.
+    checkpoints
+        Checkpoints passed in order, GOAL not counted.
+    arrival_s
+        When each tile of the course's sequence was reached [s], nan where it was not, shape (k,).
+    steps
+        Steps simulated.
+    trace
+        Time series at 100 Hz by name (`TRACE_COLUMNS`; angles in rad, duties -1..1), or None.
+    obstacles
+        Obstacles' poses over the trace, shape (samples, obstacles, 3) [m, m, rad], or None.
+    """
+
+    outcome: Outcome
+    time_s: float
+    checkpoints: int
+    arrival_s: npt.NDArray[np.float64]
+    steps: int
+    trace: Mapping[str, npt.NDArray[np.float64]] | None = None
+    obstacles: npt.NDArray[np.float64] | None = None
+
+
+class Driver:
+    """One world's arrays, made once, and drives on them."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.physics = world.robot.physics
+        self.derived = np.zeros(1, DERIVED)
+        derive(self.physics[0], world.step_s, self.derived[0])
+        self.state = np.zeros(1, STATE)
+        self.control = np.zeros(1, CONTROL)
+        self.floor = world.floor
+        self.start = world.start
+        self.limit = round(world.time_limit_s / world.step_s)
+        self.obstacles: list[Any] = []
+        self._commands = np.zeros((2, RING))
+        self._rings = np.zeros((3, RING))
+        self._engine, self._buffer, self._count = NO_ENGINE, NO_BUFFER, NO_COUNT
+
+    def simulate(self, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
+        """Drive a program from START to its outcome.
+
+        Parameters
+        ----------
+        opcodes
+            Program, shape (rows, 6).
+        seed
+            Seed of the noise, where the world has any.
+        trace
+            Whether to keep the time series.
+        """
+        self._reset()
+        every = round(TRACE_S / self.world.step_s)
+        arrival = np.full(len(self.floor.sequence), np.nan)
+        eyes = Eyes(self._rings, sensors_used(opcodes), self.world.noise.sensor_pct, np.array([seed], np.uint64))
+        samples = np.full((self.limit // every + 2 if trace else 0, len(TRACE_COLUMNS)), np.nan)
+        poses: list[list[tuple[float, float, float]]] = []
+        chunk = every if trace and self.obstacles else self.limit + 1
+        outcome, n, passed = 0, 0, 0
+        while outcome == Outcome.RUNNING:
+            poses.append([(*body.position, body.angle) for body in self.obstacles])
+            outcome, n, passed = drive(
+                opcodes, self.physics, self.derived, self.state, self.control, self.floor, self.start,
+                n, n + chunk, self.limit, passed, self.world.noise.motor_share, eyes, self._commands,
+                self._engine, self._buffer, self._count, arrival, samples, every,
+            )  # fmt: skip
+        checkpoints = min(passed, len(self.floor.sequence) - 1)
+        kept = samples[~np.isnan(samples[:, 0])]
+        return Drive(
+            Outcome(outcome),
+            n * self.world.step_s,
+            checkpoints,
+            arrival,
+            n,
+            dict(zip(TRACE_COLUMNS, kept.T.copy(), strict=True)) if trace else None,
+            np.array(poses)[: len(kept)] if trace and self.obstacles else None,
+        )
+
+    def _reset(self) -> None:
+        if self.world.uses_pymunk:
+            x, y, heading = self.start
+            self._keep, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)
+            self._engine, self._buffer, self._count = self._keep.addresses, self._keep.buffer, self._keep.count
+
+
+def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
+    """Return which of the sensors (centre, left, right) a program reads, shape (3,)."""
+    used = np.zeros(3, np.bool_)
+    used[np.unique(opcodes[opcodes[:, 0] == TEST, 1])] = True
+    return used
+
+
+def simulate(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
+    """Drive one program; see `Driver.simulate`."""
+    return Driver(world).simulate(opcodes, seed, trace)
+
+
+SUMMARY = np.dtype([("outcome", np.int8), ("time_s", float), ("checkpoints", np.int32), ("steps", np.int64)])
+
+
+def simulate_many(
+    world: World, programs: Sequence[npt.NDArray[np.int32]], seeds: Sequence[int] | None = None
+) -> npt.NDArray[np.void]:
+    """Drive many programs, each from START.
+
+    Parameters
+    ----------
+    programs
+        Opcodes, each of shape (rows, 6).
+    seeds
+        Noise seed of each; default 0.
+
+    Returns
+    -------
+    numpy.ndarray
+        Dtype `SUMMARY`, shape (n,).
+    """
+    driver = Driver(world)
+    summary = np.zeros(len(programs), SUMMARY)
+    for i, opcodes in enumerate(programs):
+        result = driver.simulate(opcodes, seeds[i] if seeds is not None else 0)
+        summary[i] = (result.outcome, result.time_s, result.checkpoints, result.steps)
+    return summary
