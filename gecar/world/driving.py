@@ -32,18 +32,17 @@ def advance(
 ) -> None:
     """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
 
-    ``commands``, shape (2, RING), remembers commands for the actuation delay. The cap on duty acts here.
+    ``commands``, shape (2, RING), remembers commands for the actuation delay, and for the half step that velocities
+    lag positions in `gecar.world.dynamics.step`. The cap on duty acts here.
     """
     left = min(max(left_duty, -p.duty_cap), p.duty_cap)
     right = min(max(right_duty, -p.duty_cap), p.duty_cap)
-    if p.actuation_delay > 0.0:
-        if n == 0:
-            commands[:] = 0.0
-        commands[0, n & (RING - 1)] = left
-        commands[1, n & (RING - 1)] = right
-        left = delayed(commands[0], n, p.actuation_delay / c.dt)
-        right = delayed(commands[1], n, p.actuation_delay / c.dt)
-    step(s, left, right, p, c)
+    if n == 0:
+        commands[:] = 0.0
+    commands[0, n & (RING - 1)] = left
+    commands[1, n & (RING - 1)] = right
+    late = p.actuation_delay / c.dt + 0.5
+    step(s, delayed(commands[0], n, late), delayed(commands[1], n, late), p, c)
     if engine[SPACE] != 0:
         turn(s, engine_step(s, c.dt, engine, buffer, count) - 0.5 * c.dt * s.yaw_rate)
     else:

@@ -1,0 +1,86 @@
+"""The nominal robot in plain Python, without any effect: what the kernel must equal bit for bit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+GRAVITY, SWEEPS, DT = 9.81, 4, 0.002
+
+
+def _turned(cos, sin, angle):
+    a2 = angle * angle
+    sine = angle * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0)))
+    cosine = 1.0 - 0.5 * a2 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0)))
+    return cos * cosine - sin * sine, sin * cosine + cos * sine
+
+
+def _clip(value, limit):
+    return min(max(value, -limit), limit)
+
+
+def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold against the kernel
+    """Return the centre of mass and the left shaft's angle after every step, three arrays of shape (steps,)."""
+    body, motor = robot.body, robot.motor
+    k = (motor.torque_constant * motor.back_emf_constant / motor.resistance) * DT / motor.inertia
+    keep, rotor = math.exp(-k), motor.inertia * k / -math.expm1(-k)
+    inv_m, inv_i, inv_j = 1.0 / body.mass, 1.0 / body.yaw_inertia, 1.0 / rotor
+    a, e, r = 0.5 * body.track_width, -body.com_ahead, body.wheel_radius
+    yaw_part = a * a * inv_i
+    own, both = inv_m + yaw_part + r * r * inv_j, inv_m - yaw_part
+    aside, cross = inv_m + e * e * inv_i, a * e * inv_i
+    det = aside * (own * own - both * both) - cross * cross * (own + own + 2.0 * both)
+    m_own, m_both = (own * aside - cross * cross) / det, -(both * aside + cross * cross) / det
+    m_side, m_ss = cross * (both + own) / det, (own * own - both * both) / det
+    weight, gain = body.mass * GRAVITY, DT * motor.torque_constant / (rotor * motor.resistance)
+    dry, voltage, mass_w = motor.coulomb_friction * DT, robot.battery.voltage, 1.0 / own
+    caster_static = weight * body.com_ahead / body.caster_ahead
+    cos, sin, x, y, heading = 1.0, 0.0, body.com_ahead, 0.0, 0.0
+    vx = vy = yaw = wl = wr = left = 0.0
+    pl = pr = ql = qr = 0.0
+    out = np.empty((3, len(duties)))
+    for n, (dl, dr) in enumerate(duties):
+        cos, sin = _turned(cos, sin, 0.5 * DT * yaw)
+        u, w = vx * cos + vy * sin, vy * cos - vx * sin
+        wl, wr = keep * wl + gain * dl * voltage, keep * wr + gain * dr * voltage
+        caster = min(max(caster_static + (pl + pr) / DT * (-body.com_height / body.caster_ahead), 0.0), weight)
+        wheel, shift = 0.5 * (weight - caster), (ql + qr) / DT * (body.com_height / body.track_width)
+        loads = [min(max(wheel - shift, 0.0), 2.0 * wheel), min(max(wheel + shift, 0.0), 2.0 * wheel)]
+        circles = [robot.tyre.friction * DT * load for load in loads]
+        pl = pr = ql = qr = fl = fr = 0.0
+        for _ in range(SWEEPS):
+            new_fl, new_fr = _clip(fl - wl * rotor, dry), _clip(fr - wr * rotor, dry)
+            wl, wr = wl + (new_fl - fl) * inv_j, wr + (new_fr - fr) * inv_j
+            fl, fr = new_fl, new_fr
+            sl, sr, ss = wl * r - (u - yaw * a), wr * r - (u + yaw * a), -(w + yaw * e)
+            new_l = pl + (m_own * sl + m_both * sr + m_side * ss)
+            new_r = pr + (m_own * sr + m_both * sl + -m_side * ss)
+            side = ql + qr + (m_side * sl + -m_side * sr + m_ss * ss)
+            grip, slid, new = max(circles[0] + circles[1], 1e-30), False, []
+            for push, slip, old, old_side, circle in (
+                (new_l, sl, pl, ql, circles[0]),
+                (new_r, sr, pr, qr, circles[1]),
+            ):
+                part = side * (circle / grip)
+                if push * push + part * part > circle * circle:
+                    slid = True
+                    push, part = old + mass_w * slip, old_side + mass_w * ss  # noqa: PLW2901
+                    scale = circle / math.sqrt(push * push + part * part + 1e-30)
+                    push, part = push * scale, part * scale  # noqa: PLW2901
+                new.append((push, part))
+            (new_l, new_ql), (new_r, new_qr) = new
+            more_l, more_r, more_s = new_l - pl, new_r - pr, (new_ql + new_qr) - (ql + qr)
+            u, w = u + (more_l + more_r) * inv_m, w + more_s * inv_m
+            yaw += ((more_r - more_l) * a + more_s * e) * inv_i
+            wl, wr = wl - more_l * r * inv_j, wr - more_r * r * inv_j
+            pl, pr, ql, qr = new_l, new_r, new_ql, new_qr
+            if not slid and abs(fl) == dry and abs(fr) == dry:
+                break
+        u, w, yaw, wl, wr = (v if abs(v) > 1e-15 else 0.0 for v in (u, w, yaw, wl, wr))
+        left += wl * DT
+        vx, vy = u * cos - w * sin, u * sin + w * cos
+        x, y, heading = x + vx * DT, y + vy * DT, heading + yaw * DT
+        cos, sin = _turned(cos, sin, 0.5 * DT * yaw)
+        out[:, n] = x, y, left
+    return out
