@@ -52,6 +52,7 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
         for _ in range(SWEEPS):
             new_fl, new_fr = _clip(fl - wl * rotor, dry), _clip(fr - wr * rotor, dry)
             wl, wr = wl + (new_fl - fl) * inv_j, wr + (new_fr - fr) * inv_j
+            settled = (abs(new_fl) == dry or new_fl == fl) and (abs(new_fr) == dry or new_fr == fr)
             fl, fr = new_fl, new_fr
             sl, sr, ss = wl * r - (u - yaw * a), wr * r - (u + yaw * a), -(w + yaw * e)
             new_l = pl + (m_own * sl + m_both * sr + m_side * ss)
@@ -75,7 +76,7 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
             yaw += ((more_r - more_l) * a + more_s * e) * inv_i
             wl, wr = wl - more_l * r * inv_j, wr - more_r * r * inv_j
             pl, pr, ql, qr = new_l, new_r, new_ql, new_qr
-            if not slid and abs(fl) == dry and abs(fr) == dry:
+            if settled and not slid:
                 break
         u, w, yaw, wl, wr = (v if abs(v) > 1e-15 else 0.0 for v in (u, w, yaw, wl, wr))
         left += wl * DT

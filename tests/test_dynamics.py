@@ -190,3 +190,10 @@ def test_speed_limit_holds_the_wheel_at_the_limit():
 def test_slew_ramps_the_duty():
     ramped = NOMINAL.with_effects({"command_slew": {"rate_pct_s": 100.0}})
     assert run(hold(0.5, 0.5, 0.25), ramped)["left_duty"][-1] == pytest.approx(0.25)
+
+
+def test_regulated_motor_holds_ten_degrees_a_second_per_percent():
+    regulated = NOMINAL.model_copy(update={"drive": NOMINAL.drive.model_copy(update={"mode": "speed"})})
+    history = run(hold(0.4, 0.4, 2.0), regulated)
+    assert math.degrees(history["left_speed"][-1]) == pytest.approx(400.0, rel=1e-4)
+    assert history["left_speed"].max() < 1.2 * history["left_speed"][-1]

@@ -24,9 +24,11 @@ from gecar.compiled import compiled
 # Rows of the address table a kernel receives; all zero: no engine, the kernel moves the body itself.
 SPACE, BODY, STEP, READ, WRITE, REQUEST = range(6)
 NO_ENGINE = np.zeros(6, np.int64)
-NO_BUFFER = np.zeros(6)
+NO_BUFFER = np.zeros(1)
 NO_COUNT = np.zeros(1, np.int32)
 
+# The batch functions grow a buffer (by realloc, fatal for one of ours) before it is quite full.
+_ROOM = 64
 _MOTION = lib.POSITION | lib.ANGLE | lib.VELOCITY | lib.ANGULAR_VELOCITY
 
 
@@ -92,7 +94,7 @@ class Engine:
     addresses
         Address table for kernels, shape (6,).
     buffer, count
-        Where the batch functions put and find the body's fields, shapes (6,) and (1,).
+        Where the batch functions put and find the body's fields, shapes (64,) and (1,).
     """
 
     space: pymunk.Space
@@ -109,7 +111,7 @@ def _address(pointer: Any) -> int:
 
 def make_engine(space: pymunk.Space, body: pymunk.Body) -> Engine:
     """Wire a space and the robot's body to compiled code."""
-    buffer = np.zeros(6)
+    buffer = np.zeros(_ROOM)
     floats = ffi.new("pmFloatArray *")
     ints = ffi.new("pmIntArray *")
     held = ffi.from_buffer("cpFloat[]", buffer)

@@ -23,6 +23,8 @@ from gecar.compiled import compiled
 GRAVITY = 9.81  # m/s^2
 SWEEPS = 4
 STILL = 1e-15  # m/s and rad/s
+FULL_SPEED = math.radians(1000.0)  # rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
+REGULATOR_RATE = 30.0  # rad/s
 
 # What changes from step to step. Angles and speeds of the shafts are the motors'; the wheels differ by the play.
 STATE = np.dtype(
@@ -47,7 +49,7 @@ DERIVED = np.dtype(
             "dt mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
             "drive_gain keep left_gain right_gain slew "
             "m_ll m_lr m_rr m_ls m_rs m_ss left_mass right_mass side_mass caster_mass "
-            "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple"
+            "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
         ).split()
     ]
 )
@@ -104,6 +106,11 @@ def _rotor(p: Any, dt: float, c: Any) -> None:
     c.rotor = inertia * k / -math.expm1(-k)
     c.inv_rotor = 1.0 / c.rotor
     c.drive_gain = dt * p.torque_constant / (c.rotor * p.resistance)
+    # Plant: gain [rad/s per duty] and time constant [s] of a free shaft.
+    gain = p.voltage / p.back_emf_constant
+    tau = dt / k
+    c.regulator_p = (2.0 * REGULATOR_RATE * tau - 1.0) / gain
+    c.regulator_i = REGULATOR_RATE * REGULATOR_RATE * tau / gain * dt
 
 
 @compiled
@@ -222,6 +229,21 @@ def slewed(duty: float, last: float, c: Any) -> float:
 
 
 @compiled
+def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
+    """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
+
+    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant; the
+    integral stops where the duty saturates. The brick's own gains are not published in these terms.
+    """
+    error = command * FULL_SPEED - speed
+    wanted = c.regulator_p * error + integral
+    duty = min(max(wanted, -1.0), 1.0)
+    if duty == wanted:
+        integral += c.regulator_i * error
+    return duty, integral
+
+
+@compiled
 def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
     """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
 
@@ -285,6 +307,9 @@ def step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
 def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
     """Turn commands into the shafts' free speeds."""
     s.voltage = supply(s, p, c)
+    if p.regulated != 0.0:
+        left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
+        right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
     s.left_duty = slewed(left_duty, s.left_duty, c)
     s.right_duty = slewed(right_duty, s.right_duty, c)
     s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
@@ -331,23 +356,33 @@ def _solve_contacts(s: Any, c: Any) -> None:
     s.left_friction = s.right_friction = 0.0
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
     for _ in range(SWEEPS):
-        _rub_shafts(s, c)
+        settled = _rub_shafts(s, c)
         sliding = _roll(s, c)
         if s.caster_circle > 0.0:
             _drag_caster(s, c)
-        elif not sliding and abs(s.left_friction) == s.left_dry and abs(s.right_friction) == s.right_dry:
-            break  # turning shafts, gripping tyres: the first sweep is exact
+        elif settled and not sliding:
+            break  # turning or standing shafts, gripping tyres: one sweep is exact
 
 
 @compiled
-def _rub_shafts(s: Any, c: Any) -> None:
-    """Give each shaft the friction impulse that would stop it, within its budget."""
+def _rub_shafts(s: Any, c: Any) -> bool:
+    """Give each shaft the friction impulse that would stop it, within its budget.
+
+    Returns
+    -------
+    bool
+        Whether another sweep would give the same: both shafts turn, or neither moved.
+    """
     left = min(max(s.left_friction - s.left_speed * c.rotor, -s.left_dry), s.left_dry)
     right = min(max(s.right_friction - s.right_speed * c.rotor, -s.right_dry), s.right_dry)
     s.left_speed += (left - s.left_friction) * c.inv_rotor
     s.right_speed += (right - s.right_friction) * c.inv_rotor
+    settled = (abs(left) == s.left_dry or left == s.left_friction) and (
+        abs(right) == s.right_dry or right == s.right_friction
+    )
     s.left_friction = left
     s.right_friction = right
+    return settled
 
 
 @compiled

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pymunk
 
 from gecar.world.chipmunk import Engine, make_engine
-from gecar.world.course import Course, Obstacle
+from gecar.world.course import Course
 from gecar.world.dynamics import GRAVITY
+from gecar.world.obstacle import Obstacle
 from gecar.world.robot import Robot
 
 WALL_RADIUS_M = 0.005

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from gecar.errors import InputError
+from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS
+from gecar.world.robot import load_robot, read_robot, write_robot
+
+EV3 = load_robot("ev3")
+
+
+def edited(tmp_path, old, new):
+    path = tmp_path / "robot.toml"
+    write_robot(EV3, path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    return path
+
+
+def test_robot_file_is_read_back_equal(tmp_path):
+    robot = EV3.with_effects({"backlash": {"angle_deg": 5.6}, "floor_tilt": {"x_rad": 0.01}})
+    write_robot(robot, tmp_path / "robot.toml")
+    assert read_robot(tmp_path / "robot.toml") == robot
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("mass = 0.75", "mass = -1.0", "body.mass: found -1.0, expected greater than 0"),
+        ("mass = 0.75", "mass = nan", "body.mass"),
+        ("mass = 0.75", "", "body.mass: found nothing"),
+        ("mass = 0.75", "mass = 0.75\nmas = 1", "body.mas: found an unknown field"),
+        ("com_ahead = -0.0322", "com_ahead = -0.2", "between the axle and the caster"),
+        ('mode = "duty"', 'mode = "torque"', "drive.mode: found torque"),
+        ("[body]", "[body", "not TOML"),
+    ],
+)
+def test_bad_robot_file_is_refused_with_its_field(tmp_path, old, new, said):
+    with pytest.raises(InputError) as error:
+        read_robot(edited(tmp_path, old, new))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        ({"gremlins": {"size": 1.0}}, "one of the catalogue"),
+        ({"backlash": {"size": 1.0}}, "expected one of angle_deg"),
+        ({"backlash": {"angle_deg": 99.0}}, "expected 0 to 25 deg"),
+        ({"backlash": {"angle_deg": float("nan")}}, "expected 0 to 25 deg"),
+    ],
+)
+def test_unknown_effect_or_value_is_refused(effects, said):
+    with pytest.raises(InputError, match=said):
+        EV3.with_effects(effects)
+
+
+def test_unknown_robot_is_refused():
+    with pytest.raises(InputError, match="'ev4'"):
+        load_robot("ev4")
+
+
+def test_effect_reaches_the_kernel_in_si():
+    assert EV3.with_effects({"backlash": {"angle_deg": 180.0 / 32.0}}).physics["backlash"][0] == np.pi / 32.0
+
+
+def test_every_parameter_is_a_field_once():
+    assert len(set(PHYSICS.names)) == len(PHYSICS.names)
+    assert len(BY_ID) == len(CATALOGUE) == 33
+    for effect in CATALOGUE:
+        for parameter in effect.parameters:
+            assert parameter.low <= EV3.nominal(parameter) <= parameter.high
