@@ -1,1 +1,1 @@
-""""""
+"""Grammars, the mapping of genomes to programs, and the robot's language."""
