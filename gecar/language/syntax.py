@@ -1,0 +1,166 @@
+"""Reading the robot language: text to statements.
+
+    program   = { statement | ";" }
+    statement = "motor" "(" sum "," sum "," sum ")"
+              | "motor_until" "(" sum "," sum "," sum "," condition ")"
+              | "if" condition branch { "elif" condition branch } [ "else" branch ]
+              | "pass"
+    branch    = "{" program "}" | ":" block | "if" ...   (only after else: "else if" is "elif")
+    condition = sum comparison sum, one side a sensor, in any number of parentheses
+    sum       = numbers with + - * / and parentheses, worked out while reading
+
+Statements may follow each other with or without line ends and semicolons; ``#`` begins a comment. A block
+after a colon is the rest of the line or, if nothing follows there, the lines indented deeper than the line
+of its ``if``, all alike. Outside such blocks indentation means nothing. So both of the paper's ways of
+writing (Table 3, Fig. 6) are read.
+
+Duties become whole percent, times whole milliseconds and thresholds thousandths of a percent, by rounding.
+"""
+
+from __future__ import annotations
+
+from gecar.errors import expected
+from gecar.language import opcodes
+from gecar.language.expressions import Expressions
+from gecar.language.statements import If, Motor, MotorUntil, Statement
+
+MAX_CHARACTERS = 100_000
+MAX_STATEMENTS = 10_000
+
+_STATEMENT = "motor, motor_until, if"
+
+
+def parse_statements(text: str, source: str) -> tuple[Statement, ...]:
+    """Read a program's text.
+
+    Parameters
+    ----------
+    text
+        The program, its line ends plain.
+    source
+        Its file's name, for errors.
+
+    Raises
+    ------
+    InputError
+        If it is not a program, or beyond the limits above; the message names line and column.
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise expected(source, f"{len(text)} characters", f"a program of at most {MAX_CHARACTERS}")
+    return _Parser(text, source).program()
+
+
+class _Parser(Expressions):
+    """Recursive descent through statements and the expressions in them."""
+
+    def __init__(self, text: str, source: str) -> None:
+        super().__init__(text, source)
+        self.statements = 0
+
+    def program(self) -> tuple[Statement, ...]:
+        """Read statements to the end of the text."""
+        statements: list[Statement] = []
+        while self.next.kind != "end":
+            self.statement(statements)
+        return tuple(statements)
+
+    def statement(self, statements: list[Statement]) -> None:
+        """Read one statement, ``pass`` or semicolon, and add what it does."""
+        word = self.next.text
+        self.statements += 1
+        if self.statements > MAX_STATEMENTS:
+            raise self.fault(f"a program of at most {MAX_STATEMENTS} statements")
+        if word == "motor":
+            statements.append(self.motor())
+        elif word == "if":
+            statements.append(self.conditional())
+        elif word == "motor_until":
+            statements.append(self.motor_until())
+        elif word in {";", "pass"}:
+            self.take()
+        else:
+            before = "an if before it and in line with it, or " if word in {"else", "elif"} else ""
+            raise self.fault(before + _STATEMENT)
+
+    def motor(self) -> Motor:
+        """Read ``motor(left, right, time)``."""
+        self.take()
+        motor = Motor(*self.drive())
+        self.mark(")")
+        return motor
+
+    def motor_until(self) -> MotorUntil:
+        """Read ``motor_until(left, right, time, test)``."""
+        self.take()
+        drive = self.drive()
+        self.mark(",")
+        statement = MotorUntil(*drive, self.condition())
+        self.mark(")")
+        return statement
+
+    def drive(self) -> tuple[int, int, int]:
+        """Read the arguments all motor statements share."""
+        self.mark("(")
+        duty = f"a duty of -{opcodes.MAX_DUTY_PCT}..{opcodes.MAX_DUTY_PCT} percent"
+        left = self.bounded(-opcodes.MAX_DUTY_PCT, opcodes.MAX_DUTY_PCT, duty)
+        self.mark(",")
+        right = self.bounded(-opcodes.MAX_DUTY_PCT, opcodes.MAX_DUTY_PCT, duty)
+        self.mark(",")
+        return left, right, self.bounded(0, opcodes.MAX_TIME_MS, f"a time of 0..{opcodes.MAX_TIME_MS} ms")
+
+    def conditional(self) -> If:
+        """Read an ``if`` (or ``elif``) with its branches."""
+        indent = self.line_indent
+        self.deeper()
+        self.take()
+        condition = self.condition()
+        braces = self.next.text == "{"
+        then = self.branch(indent)
+        otherwise: tuple[Statement, ...] = ()
+        if self.next.text in {"else", "elif"} and self.belongs(indent, braces):
+            otherwise = self.alternative(indent)
+        self.depth -= 1
+        return If(condition, then, otherwise)
+
+    def belongs(self, indent: int, braces: bool) -> bool:
+        """Whether the ``else`` that comes next is that of an ``if`` in a line indented by `indent`."""
+        return self.next.indent in {-1, indent} or (braces and self.next.indent > indent)
+
+    def alternative(self, indent: int) -> tuple[Statement, ...]:
+        """Read what follows a then-branch: ``else`` and its branch, ``else if`` or ``elif``."""
+        if self.next.text == "else":
+            self.take()
+            if self.next.text != "if":
+                return self.branch(indent)
+        return (self.conditional(),)
+
+    def branch(self, indent: int) -> tuple[Statement, ...]:
+        """Read the statements of one branch of an ``if`` in a line indented by `indent`."""
+        statements: list[Statement] = []
+        if self.next.text == "{":
+            self.take()
+            while self.next.text != "}":
+                if self.next.kind == "end":
+                    raise self.fault("} to close the branch")
+                self.statement(statements)
+            self.take()
+        elif self.next.text == ":":
+            self.take()
+            self.block(indent, statements)
+        else:
+            raise self.fault(": or {")
+        return tuple(statements)
+
+    def block(self, indent: int, statements: list[Statement]) -> None:
+        """Read the statements after a colon: the rest of the line, or lines indented deeper than `indent`."""
+        level = self.next.indent
+        if self.next.kind == "end" or -1 < level <= indent:
+            raise self.fault(f"{_STATEMENT} or pass after the colon, or indented below it")
+        first = True
+        while first or self.next.text not in {"", "}", "else", "elif"}:
+            if not first and self.next.indent > -1 and (level == -1 or self.next.indent <= indent):
+                break
+            if self.next.indent not in {-1, level}:
+                raise self.fault(f"an indent of {level}, as in the block's first line, or at most {indent}")
+            self.statement(statements)
+            first = False
