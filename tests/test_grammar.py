@@ -142,6 +142,10 @@ def test_a_grammar_is_found_by_name_and_by_path(tmp_path: Path, monkeypatch: pyt
         load_grammar("grammars")
 
 
+def test_blanks_without_end_take_no_time() -> None:
+    assert alternatives(parse_grammar("<a> ::= x" + " " * 90_000 + "y"))[0][0] == "x" + " " * 90_000 + "y"
+
+
 def test_a_long_chain_of_rules_is_checked_quickly() -> None:
     rules = [f"<n{k}> ::= <n{k + 1}> | <n{k + 1}><n0>" for k in range(299)]
     grammar = parse_grammar("\n".join([*rules, "<n299> ::= x"]))

@@ -120,6 +120,10 @@ def test_empty_programs_and_branches_are_legal() -> None:
     assert parse_program(program.source) == program
 
 
+def test_blanks_without_end_take_no_time() -> None:
+    assert parse_program(" " * 90_000 + "\x0b" + "\t" * 9_000) == Program(())
+
+
 def test_numbers_are_rounded_to_what_the_robot_knows() -> None:
     program = parse_program("motor(200/3, -7/2, 100/3) if SensorValue > 100/3 {}")
     assert program.source.splitlines()[:2] == ["motor(67,-4,33)", "if(SensorValue > 33.333):"]

@@ -40,7 +40,7 @@ _TOKEN = re.compile(
     | (?P<name><[^<>|\s]+>)
     | (?P<quoted>"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')
     | (?P<escape>\\\n[ \t]*|\\.)
-    | (?P<text><|(?:(?![ \t]*(?:\#|\n|\Z))[^|"'<\\\n])+)
+    | (?P<text><|(?:[^|"'<\\\n\# \t]+|[ \t]+(?![ \t\#\n]|\Z))+)
     | (?P<open>["'])
     | (?P<stray>\\)
     """,
@@ -118,6 +118,7 @@ class _Reader:
         self.source = source
         self.ranges = ranges
         self.rules: list[RawRule] = []
+        self.seen: dict[str, int] = {}
         self.pieces: list[_Piece] = []
 
     def read(self) -> list[RawRule]:
@@ -149,10 +150,10 @@ class _Reader:
             raise self.fault(offset, f"{name} ::= in the middle of a line", "every rule on a line of its own")
         if self.rules:
             self.end_alternative(offset)
-        for other in self.rules:
-            if other.name == name:
-                first = self.text.count("\n", 0, other.offset) + 1
-                raise self.fault(offset, f"a second rule for {name}", f"one (the first is in line {first})")
+        if name in self.seen:
+            first = self.text.count("\n", 0, self.seen[name]) + 1
+            raise self.fault(offset, f"a second rule for {name}", f"one (the first is in line {first})")
+        self.seen[name] = offset
         self.rules.append(RawRule(name, offset))
 
     def add(self, kind: str, token: str, offset: int) -> None:

@@ -15,7 +15,7 @@ MAX_DEPTH = 100  # of ifs and parentheses within each other
 MAX_NUMBER = 10**12
 
 _TOKEN = re.compile(
-    r"[ \t\f]*(?:#[^\n]*)?(?:(?P<line>\n)|(?P<number>[0-9]+(?:\.[0-9]*)?|\.[0-9]+)|(?P<word>[A-Za-z_]\w*)"
+    r"[^\S\n]*(?:#[^\n]*)?(?:(?P<line>\n)|(?P<number>[0-9]+(?:\.[0-9]*)?|\.[0-9]+)|(?P<word>[A-Za-z_]\w*)"
     r"|(?P<mark>[<>=!]=|[-+*/(){},:;<>])|(?P<stray>\S)|\Z)"
 )
 _SENSORS = {sensor.word: sensor for sensor in Sensor}

@@ -8,6 +8,8 @@ from gecar.language.program import parse_program
 
 _MAX_PARTS = 20_000
 
+Parts = tuple[str | int, ...]
+
 
 def check_robot_language(grammar: Grammar) -> None:
     """Check that a grammar speaks the robot language.
@@ -23,19 +25,16 @@ def check_robot_language(grammar: Grammar) -> None:
         phenotype.
     """
     contexts = _contexts(grammar)
+    best = [min(rule.productions, key=lambda p: _depth(grammar, p)).parts for rule in grammar.rules]
     for k, rule in enumerate(grammar.rules):
         for production in rule.productions if k in contexts else ():
             before, after = contexts[k]
-            _check(grammar, production, (*before, *production.parts, *after))
+            _check(grammar, production, _written((*before, *production.parts, *after), best))
 
 
-Parts = tuple[str | int, ...]
-
-
-def _check(grammar: Grammar, production: Production, parts: Parts) -> None:
+def _check(grammar: Grammar, production: Production, text: str | None) -> None:
     where = f"{grammar.source}, line {production.line}"
     shown = repr(grammar.shown(production.parts)[:60])
-    text = _shallowest(grammar, parts)
     if text is None:
         raise expected(where, f"{shown}, whose shallowest phenotype is endlessly long", "robot programs")
     try:
@@ -59,9 +58,8 @@ def _contexts(grammar: Grammar) -> dict[int, tuple[Parts, Parts]]:
     return contexts
 
 
-def _shallowest(grammar: Grammar, parts: Parts) -> str | None:
-    """Write the parts with each nonterminal's shallowest tree in its place; None if that never ends."""
-    best = [min(rule.productions, key=lambda p: _depth(grammar, p)) for rule in grammar.rules]
+def _written(parts: Parts, best: list[Parts]) -> str | None:
+    """Write parts, putting for each nonterminal what is best for it; None if that goes on and on."""
     written: list[str] = []
     waiting = list(reversed(parts))
     for _ in range(_MAX_PARTS):
@@ -71,7 +69,7 @@ def _shallowest(grammar: Grammar, parts: Parts) -> str | None:
         if isinstance(part, str):
             written.append(part)
         else:
-            waiting.extend(reversed(best[part].parts))
+            waiting.extend(reversed(best[part]))
     return None
 
 
