@@ -1,0 +1,1 @@
+"""What people have on disk, made into recordings: read, guess, repair, join."""
