@@ -11,6 +11,13 @@ from typing import Any
 from gecar.errors import InputError, expected
 
 
+def shipped(folder: str) -> Path:
+    """Return a folder of files that come with gecar: inside the package if installed, else beside it."""
+    package = Path(__file__).parent
+    inside = package / folder
+    return inside if inside.is_dir() else package.parent / folder
+
+
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader, or a crash, sees either the old content or the new, never a part.
 

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text
+from gecar.files import read_text, shipped
 from gecar.language.bnf import RawRule, Reference, parse_rules
 from gecar.language.place import place, plain
 
 MAX_NONTERMINALS = 1_000
-_SHIPPED = Path(__file__).parents[2] / "grammars"
+GRAMMARS = shipped("grammars")
 
 
 @dataclass(frozen=True)
@@ -200,17 +200,25 @@ def load_grammar(name: str | Path, ranges: Mapping[str, int] | None = None) -> G
         If there is no such grammar, or as `parse_grammar`.
     """
     path = Path(name)
-    if path.exists():
+    if path.is_file():
         return read_grammar(path, ranges)
-    folders = (Path("grammars"), _SHIPPED)
-    for folder in folders:
+    for folder in _folders():
         named = folder / (path.name if path.suffix == ".bnf" else f"{path.name}.bnf")
         if path.parent == Path() and named.exists():
             return read_grammar(named, ranges)
-    known = sorted({file.stem for folder in folders for file in folder.glob("*.bnf")})
     raise expected(
-        "grammar", f"no file or grammar {str(name)!r}", f"a .bnf file, or one of {', '.join(known)}"
+        "grammar", f"no file or grammar {str(name)!r}", f"a .bnf file, or one of {', '.join(list_grammars())}"
     )
+
+
+def list_grammars() -> list[str]:
+    """Return the names `load_grammar` knows, the paper's first."""
+    names = sorted({file.stem for folder in _folders() for file in folder.glob("*.bnf")})
+    return sorted(names, key=lambda name: name != "paper")
+
+
+def _folders() -> tuple[Path, ...]:
+    return Path("grammars"), GRAMMARS
 
 
 def _resolve(raw: list[RawRule], text: str, source: str) -> tuple[Rule, ...]:

@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text
+from gecar.files import read_text, shipped
 from gecar.world import line, raster
 from gecar.world.course_file import validate
 from gecar.world.course_parts import parts_from
@@ -26,7 +26,7 @@ from gecar.world.shortest import ShortestWay, shortest_way
 
 __all__ = ["COURSES", "Course", "Obstacle", "Pose", "list_courses", "load_course", "parse_course"]
 
-COURSES = Path(__file__).parents[2] / "courses"
+COURSES = shipped("courses")
 _LARGEST_FILE = 1_000_000
 
 

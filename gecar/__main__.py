@@ -1,0 +1,35 @@
+"""The command line: ``python -m gecar``, or ``gecar`` where it is installed."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from gecar.errors import InputError
+
+REPORT = "Please report this with the command you typed; GECAR_DEBUG=1 shows where it happened."
+
+
+def main() -> None:
+    """Run the command line; exit code 0, 2 for a bad input, 130 for Ctrl-C, 1 for a fault of gecar's own."""
+    try:
+        from gecar.cli.application import application  # noqa: PLC0415  an interrupt while importing is caught too
+
+        application()()
+    except InputError as error:
+        _end(f"error: {error}", 2)
+    except KeyboardInterrupt:
+        _end("stopped", 130)
+    except Exception as error:  # the last place before the user: a traceback only for who asks
+        if os.environ.get("GECAR_DEBUG"):
+            raise
+        _end(f"internal error: {type(error).__name__}: {error}\n{REPORT}", 1)
+
+
+def _end(words: str, code: int) -> None:
+    print(words, file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""The commands, and how each is imported only when it is called.
+
+``gecar --help`` names every command without importing one: the compiler and the plotting library alone take
+longer to import than anyone waits for help.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from gecar import __version__
+
+EVOLVE, COURSES, ROBOT = "Evolve", "Courses and grammars", "The real robot"
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A command's place in the list.
+
+    Attributes
+    ----------
+    name
+        As typed.
+    panel
+        The group it is listed in.
+    words
+        One line of help.
+    place
+        Module in `gecar.cli`, and its function or `typer.Typer`: ``evolve:evolve``.
+    """
+
+    name: str
+    panel: str
+    words: str
+    place: str
+
+    @property
+    def exists(self) -> bool:
+        """Whether its module is there."""
+        return find_spec(f"gecar.cli.{self.place.partition(':')[0]}") is not None
+
+    def load(self) -> Any:
+        """Import it, as a command of the command line."""
+        module, _, attribute = self.place.partition(":")
+        found = getattr(import_module(f"gecar.cli.{module}"), attribute)
+        if isinstance(found, typer.Typer):
+            return typer.main.get_command(found)
+        alone = typer.Typer(rich_markup_mode="rich", add_completion=False)
+        alone.command(self.name, no_args_is_help=False)(found)
+        return typer.main.get_command(alone)
+
+
+SEATS = (
+    Seat("evolve", EVOLVE, "Evolve a program that brings the robot round a course.", "evolve:evolve"),
+    Seat(
+        "simulate", EVOLVE, "Drive a program in the simulation; draw or film the drive.", "simulate:simulate"
+    ),
+    Seat("plot", EVOLVE, "Draw a run's pictures again, or several runs beside each other.", "plot:plot"),
+    Seat("table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"),
+    Seat("check", EVOLVE, "Compare a table of fitness figures with a fresh run.", "check:check"),
+    Seat("course", COURSES, "List, show, print and make courses.", "course:course"),
+    Seat("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
+    Seat("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
+    Seat("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
+    Seat("compare", ROBOT, "Set simulation beside recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"),
+    Seat("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
+    Seat("discover", ROBOT, "Find which physics the simulation left out.", "discover:discover"),
+    Seat("effects", ROBOT, "List the physics a simulation may have left out.", "effects:effects"),
+)
+
+
+class Commands(TyperGroup):
+    """A group whose commands are listed from `SEATS` and imported when called."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._seats = {seat.name: seat for seat in SEATS if seat.exists}
+        for seat in self._seats.values():
+            self.add_command(TyperCommand(seat.name, help=seat.words, rich_help_panel=seat.panel))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Put the real command in the place of its line in the list."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if name in self._seats:
+            command = self._seats[name].load()
+            command.name = name
+        return name, command, rest
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; Ctrl-C ends it with a word and without a traceback."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            print("stopped", file=sys.stderr)
+            raise typer.Exit(130) from None
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"gecar {__version__}")
+        raise typer.Exit
+
+
+def _root(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Show the version and exit."
+    ),
+) -> None:
+    """Evolve readable programs for a line-following robot, and close the gap to the real one.
+
+    [bold]Start here[/]
+
+      gecar evolve                      a program for the paper's course, with pictures
+      gecar simulate runs/.../best.txt  drive it again
+      gecar course list                 where else to drive
+
+    Every command explains itself: [bold]gecar evolve --help[/]
+    """
+
+
+def application() -> typer.Typer:
+    """Build the command line."""
+    app = typer.Typer(
+        name="gecar",
+        cls=Commands,
+        rich_markup_mode="rich",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["--help", "-h"]},
+    )
+    app.callback()(_root)
+    return app

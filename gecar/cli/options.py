@@ -1,0 +1,40 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+WORLD = "World"
+
+CourseOption = Annotated[
+    str | None,
+    typer.Option("--course", metavar="NAME|FILE", help="Where to drive; [bold]gecar course list[/] names them.",
+                 show_default="paper", rich_help_panel=WORLD),
+]  # fmt: skip
+RobotOption = Annotated[
+    str | None,
+    typer.Option("--robot", metavar="NAME|FILE", help="Who drives: ev3, or a robot file (.toml).",
+                 show_default="ev3", rich_help_panel=WORLD),
+]  # fmt: skip
+NoiseOption = Annotated[
+    float | None,
+    typer.Option("--noise", metavar="PCT", help="Standard deviation of each sensor reading, in percent.",
+                 show_default="0", rich_help_panel=WORLD),
+]  # fmt: skip
+MotorNoiseOption = Annotated[
+    float | None,
+    typer.Option("--motor-noise", metavar="PCT", help="Standard deviation of the motors' strength, in percent.",
+                 show_default="0", rich_help_panel=WORLD),
+]  # fmt: skip
+TimeLimitOption = Annotated[
+    float | None,
+    typer.Option("--time-limit", metavar="S", help="When a drive ends without GOAL, in seconds.",
+                 show_default="60", rich_help_panel=WORLD),
+]  # fmt: skip
+EngineOption = Annotated[
+    str | None,
+    typer.Option("--engine", metavar="auto|inline|pymunk", rich_help_panel=WORLD, show_default="auto",
+                 help="What moves the body; auto: pymunk where the course has something to touch."),
+]  # fmt: skip
