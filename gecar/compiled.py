@@ -45,7 +45,7 @@ def _cache_folder() -> Path:
     return folder
 
 
-numba.config.CACHE_DIR = str(_cache_folder())
+setattr(numba.config, "CACHE_DIR", str(_cache_folder()))  # noqa: B010 - numba declares its settings at run time
 
 
 def compiled(function: F) -> F:
@@ -54,9 +54,5 @@ def compiled(function: F) -> F:
     Kernels release the interpreter lock, never raise (division by zero gives inf or nan) and keep IEEE order of
     operations, so that results are equal on every machine with the same versions.
     """
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
-
-
-def inlined(function: F) -> F:
-    """Compile a small kernel that callers always inline: for the innermost loops only."""
-    return numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")(function)  # type: ignore[no-any-return]
+    dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return dispatcher

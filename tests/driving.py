@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.compiled import compiled
-from gecar.world.dynamics import DERIVED, STATE, derive, drift, place, step
+from gecar.world.dynamics import drift, step
 from gecar.world.robot import Robot, load_robot
+from gecar.world.state import DERIVED, STATE, derive, place
 
 NOMINAL = load_robot("ev3")
 
@@ -32,7 +33,15 @@ def run(
     """Return the state after every step, dtype STATE, shape (steps,)."""
     duties = np.ascontiguousarray(duties, dtype=float)
     history = np.zeros(len(duties), STATE)
-    _run(duties, robot.physics, np.zeros(1, DERIVED), np.zeros(1, STATE), dt, np.array(start, dtype=float), history)
+    _run(
+        duties,
+        robot.physics,
+        np.zeros(1, DERIVED),
+        np.zeros(1, STATE),
+        dt,
+        np.array(start, dtype=float),
+        history,
+    )
     return history
 
 

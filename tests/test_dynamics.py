@@ -5,8 +5,9 @@ import pytest
 from driving import NOMINAL, axle, hold, run, wild_duties
 from nominal_reference import nominal_run
 
-from gecar.world.dynamics import DERIVED, GRAVITY, bare_shaft, conduct, derive
 from gecar.world.effects import CATALOGUE
+from gecar.world.motor import bare_shaft, conduct
+from gecar.world.state import DERIVED, GRAVITY, derive
 
 MOTOR, BODY = NOMINAL.motor, NOMINAL.body
 VOLTAGE = NOMINAL.battery.voltage

@@ -1,1 +1,1 @@
-""""""
+"""The robot, its course, and the physics between them."""

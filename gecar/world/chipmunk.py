@@ -37,22 +37,22 @@ def _call(builder: Any, address: Any, arguments: Sequence[Any]) -> None:
     builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def _call_pointer_double(typing: Any, function: Any, pointer: Any, number: Any) -> Any:  # noqa: ARG001
     """Call ``void f(void *, double)`` at an address."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         _call(builder, arguments[0], arguments[1:])
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.float64), generate
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def _call_pointers(typing: Any, function: Any, first: Any, second: Any) -> Any:  # noqa: ARG001
     """Call ``void f(void *, void *)`` at an address."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
         _call(builder, arguments[0], arguments[1:])
         return context.get_dummy_value()
 
@@ -61,7 +61,11 @@ def _call_pointers(typing: Any, function: Any, first: Any, second: Any) -> Any: 
 
 @compiled
 def engine_step(
-    s: Any, dt: float, engine: npt.NDArray[np.int64], buffer: npt.NDArray[np.float64], count: npt.NDArray[np.int32]
+    s: Any,
+    dt: float,
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
 ) -> float:
     """Let pymunk move the robot and everything it touches by one step.
 
@@ -74,13 +78,13 @@ def engine_step(
     buffer[0], buffer[1], buffer[2] = s.x, s.y, s.heading
     buffer[3], buffer[4], buffer[5] = s.vx, s.vy, s.yaw_rate
     count[0] = 0
-    _call_pointers(engine[WRITE], engine[BODY], engine[REQUEST])
+    _call_pointers(engine[WRITE], engine[BODY], engine[REQUEST])  # type: ignore[call-arg]
     _call_pointer_double(engine[STEP], engine[SPACE], dt)
     count[0] = 0
     _call_pointers(engine[READ], engine[BODY], engine[REQUEST])
     s.x, s.y, s.heading = buffer[0], buffer[1], buffer[2]
     s.vx, s.vy, s.yaw_rate = buffer[3], buffer[4], buffer[5]
-    return s.heading - before  # type: ignore[no-any-return]
+    return s.heading - before
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from gecar.compiled import compiled
 from gecar.world.chipmunk import SPACE, engine_step
-from gecar.world.dynamics import drift, place, step, turn
-from gecar.world.interpreter import Eyes, Floor, look, run_program, see
+from gecar.world.dynamics import drift, step, turn
+from gecar.world.interpreter import Floor, look, run_program, see
 from gecar.world.sensing import RING, delayed
+from gecar.world.state import place
 
 # Outcome codes; `gecar.world.rollout.Outcome` names them.
 RUNNING, GOAL, OFF_COURSE, OUT_OF_TIME, STUCK, MISSED_CHECKPOINT = range(6)
@@ -32,17 +33,17 @@ def advance(
 ) -> None:
     """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
 
-    ``commands``, shape (2, RING), remembers commands for the actuation delay, and for the half step that velocities
+    ``commands``, shape (2 RING,), remembers commands for the actuation delay, and for the half step that velocities
     lag positions in `gecar.world.dynamics.step`. The cap on duty acts here.
     """
     left = min(max(left_duty, -p.duty_cap), p.duty_cap)
     right = min(max(right_duty, -p.duty_cap), p.duty_cap)
     if n == 0:
         commands[:] = 0.0
-    commands[0, n & (RING - 1)] = left
-    commands[1, n & (RING - 1)] = right
+    commands[n & (RING - 1)] = left
+    commands[RING + (n & (RING - 1))] = right
     late = p.actuation_delay / c.dt + 0.5
-    step(s, delayed(commands[0], n, late), delayed(commands[1], n, late), p, c)
+    step(s, delayed(commands, 0, n, late), delayed(commands, RING, n, late), p, c)
     if engine[SPACE] != 0:
         turn(s, engine_step(s, c.dt, engine, buffer, count) - 0.5 * c.dt * s.yaw_rate)
     else:
@@ -60,7 +61,9 @@ def _tile_at(x: float, y: float, floor: Floor) -> int:
 
 
 @compiled
-def _arrive(tile: int, passed: int, time: float, floor: Floor, arrival: npt.NDArray[np.float64]) -> tuple[int, int]:
+def _arrive(
+    tile: int, passed: int, time: float, floor: Floor, arrival: npt.NDArray[np.float64]
+) -> tuple[int, int]:
     """Return (outcome, tiles of the sequence passed) on entering a tile."""
     if tile < 0 or not floor.drivable[tile]:
         return OFF_COURSE, passed
@@ -102,8 +105,7 @@ def drive(
     last: int,
     limit: int,
     passed: int,
-    motor_noise: float,
-    eyes: Eyes,
+    eyes: npt.NDArray[Any],
     commands: npt.NDArray[np.float64],
     engine: npt.NDArray[np.int64],
     buffer: npt.NDArray[np.float64],
@@ -119,13 +121,14 @@ def drive(
     tuple
         (outcome, step it ended at, tiles of the sequence passed).
     """
-    p, c, s, k = physics[0], derived[0], state[0], control[0]
+    p, c, s, k, e = physics[0], derived[0], state[0], control[0], eyes[0]
     if first == 0:
         place(s, p, start[0], start[1], start[2])
         k.row = k.due_step = k.line = 0
         k.until = -1
         k.due_ms = k.left_duty = k.right_duty = 0.0
     tile = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+    remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
     for n in range(first, last):
         k.step = n
         now = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
@@ -136,8 +139,10 @@ def drive(
         if outcome == RUNNING and n >= limit:
             outcome = OUT_OF_TIME
         if outcome == RUNNING:
-            look(n, s, p, c.dt, floor, eyes)
-            if not run_program(program, k, s, p, c.dt, floor, eyes, motor_noise):
+            if remembers:
+                look(n, s, p, c.dt, floor, e)
+            waits = n < k.due_step and k.until < 0
+            if not waits and not run_program(program, k, s, p, c.dt, floor, e):
                 outcome = STUCK
         if trace.shape[0] > 0 and (n % every == 0 or outcome != RUNNING):
             _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
@@ -145,3 +150,30 @@ def drive(
             return outcome, n, passed
         advance(n, s, k.left_duty, k.right_duty, p, c, commands, engine, buffer, count)
     return RUNNING, last, passed
+
+
+@compiled
+def hold_duties(
+    first: int,
+    last: int,
+    left_duty: float,
+    right_duty: float,
+    physics: npt.NDArray[Any],
+    derived: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    start: npt.NDArray[np.float64],
+    floor: Floor,
+    eyes: npt.NDArray[Any],
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+) -> None:
+    """Hold two commands from step ``first`` to step ``last``, whoever gave them; at step 0 from the start pose."""
+    p, c, s, e = physics[0], derived[0], state[0], eyes[0]
+    if first == 0:
+        place(s, p, start[0], start[1], start[2])
+    for n in range(first, last):
+        look(n, s, p, c.dt, floor, e)
+        advance(n, s, left_duty, right_duty, p, c, commands, engine, buffer, count)
+    look(last, s, p, c.dt, floor, e)

@@ -16,256 +16,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from gecar.compiled import compiled
+from gecar.world.motor import (
+    conduct,
+    effective_duty,
+    friction_budget,
+    motor_current,
+    regulate,
+    slewed,
+    supply,
+)
 
-GRAVITY = 9.81  # m/s^2
 SWEEPS = 4
 STILL = 1e-15  # m/s and rad/s
-FULL_SPEED = math.radians(1000.0)  # rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
-REGULATOR_RATE = 30.0  # rad/s
-
-# What changes from step to step. Angles and speeds of the shafts are the motors'; the wheels differ by the play.
-STATE = np.dtype(
-    [
-        (field, np.float64)
-        for field in (
-            "t x y heading cos sin vx vy yaw_rate "
-            "left_angle right_angle left_speed right_speed left_play right_play "
-            "left_push right_push left_side right_side caster_push caster_side "
-            "left_friction right_friction left_duty right_duty left_integral right_integral battery_current "
-            # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
-            "u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
-        ).split()
-    ]
-)
-
-# What follows from the robot's constants and the step size, computed once per drive.
-DERIVED = np.dtype(
-    [
-        (field, np.float64)
-        for field in (
-            "dt mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
-            "drive_gain keep left_gain right_gain slew "
-            "m_ll m_lr m_rr m_ls m_rs m_ss left_mass right_mass side_mass caster_mass "
-            "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
-        ).split()
-    ]
-)
-
-
-@compiled
-def derive(p: Any, dt: float, c: Any) -> None:
-    """Compute a drive's derived constants.
-
-    Parameters
-    ----------
-    p
-        Record of dtype `PHYSICS`.
-    dt
-        Step [s].
-    c
-        Record of dtype `DERIVED`, overwritten.
-    """
-    c.dt = dt
-    c.mass = p.mass
-    c.inv_mass = 1.0 / p.mass
-    c.inv_inertia = 1.0 / p.yaw_inertia
-    c.half_track = 0.5 * p.track_width * p.track_scale
-    c.axle = -p.com_ahead
-    c.caster = p.caster_ahead - p.com_ahead
-    c.left_radius = p.wheel_radius * p.radius_scale * (1.0 - 0.5 * p.radius_difference)
-    c.right_radius = p.wheel_radius * p.radius_scale * (1.0 + 0.5 * p.radius_difference)
-    _rotor(p, dt, c)
-    c.left_gain = 1.0 - 0.5 * p.gain_difference
-    c.right_gain = 1.0 + 0.5 * p.gain_difference
-    c.slew = p.command_slew * dt
-    c.weight = p.mass * GRAVITY
-    c.caster_static = c.weight * p.com_ahead / p.caster_ahead
-    c.caster_arm = -p.com_height / p.caster_ahead
-    c.transfer_side = p.com_height / p.track_width / p.track_scale
-    c.play = 0.5 * p.backlash
-    c.tilt_x = GRAVITY * math.sin(p.tilt_x) * dt
-    c.tilt_y = GRAVITY * math.sin(p.tilt_y) * dt
-    c.sliding = p.coulomb_friction * dt
-    c.ripple = p.ripple_amplitude * dt / c.rotor
-    _contact_masses(c)
-
-
-@compiled
-def _rotor(p: Any, dt: float, c: Any) -> None:
-    """Set the shaft's inertia over a step, and how much of its speed it keeps.
-
-    J dw/dt = T - B w, with B = Kt Ke / R + b, has the exact step w' = keep w + T dt / rotor for a constant torque T:
-    keep = exp(-k), rotor = J k / (1 - keep), k = B dt / J. The contacts' impulses act on the same ``rotor``.
-    """
-    inertia = p.inertia * p.inertia_scale
-    k = (p.torque_constant * p.back_emf_constant / p.resistance + p.viscous_friction) * dt / inertia
-    c.keep = math.exp(-k)
-    c.rotor = inertia * k / -math.expm1(-k)
-    c.inv_rotor = 1.0 / c.rotor
-    c.drive_gain = dt * p.torque_constant / (c.rotor * p.resistance)
-    # Plant: gain [rad/s per duty] and time constant [s] of a free shaft.
-    gain = p.voltage / p.back_emf_constant
-    tau = dt / k
-    c.regulator_p = (2.0 * REGULATOR_RATE * tau - 1.0) / gain
-    c.regulator_i = REGULATOR_RATE * REGULATOR_RATE * tau / gain * dt
-
-
-@compiled
-def _contact_masses(c: Any) -> None:
-    """Invert the matrix that maps impulses (left, right, sideways at the axle) to the slip they end."""
-    yaw = c.half_track * c.half_track * c.inv_inertia
-    left = c.inv_mass + yaw + c.left_radius * c.left_radius * c.inv_rotor
-    right = c.inv_mass + yaw + c.right_radius * c.right_radius * c.inv_rotor
-    both = c.inv_mass - yaw
-    side = c.inv_mass + c.axle * c.axle * c.inv_inertia
-    cross = c.half_track * c.axle * c.inv_inertia  # sideways against the right wheel; the left one's is its negative
-    determinant = side * (left * right - both * both) - cross * cross * (left + right + 2.0 * both)
-    c.m_ll = (right * side - cross * cross) / determinant
-    c.m_rr = (left * side - cross * cross) / determinant
-    c.m_lr = -(both * side + cross * cross) / determinant
-    c.m_ls = cross * (both + right) / determinant
-    c.m_rs = -(cross * (both + left)) / determinant
-    c.m_ss = (left * right - both * both) / determinant
-    c.left_mass = 1.0 / left
-    c.right_mass = 1.0 / right
-    c.side_mass = 1.0 / side
-    c.caster_mass = 1.0 / (c.inv_mass + c.caster * c.caster * c.inv_inertia)
-
-
-@compiled
-def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
-    """Put the robot at rest with its axle's centre at a pose [m, m, rad]."""
-    for_zero = 0.0
-    s.t = s.vx = s.vy = s.yaw_rate = for_zero
-    s.left_angle = s.right_angle = s.left_speed = s.right_speed = s.left_play = s.right_play = for_zero
-    s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = for_zero
-    s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
-    s.left_integral = s.right_integral = s.battery_current = for_zero
-    s.heading = heading
-    s.cos = math.cos(heading)
-    s.sin = math.sin(heading)
-    s.x = x + p.com_ahead * s.cos
-    s.y = y + p.com_ahead * s.sin
-
-
-@compiled
-def turn(s: Any, angle: float) -> None:
-    """Turn the heading's cosine and sine by a small angle [rad].
-
-    By series: no library call in the inner loop, and the same bits on every machine. The error is below 1e-16 for
-    angles under 0.1 rad.
-    """
-    a2 = angle * angle
-    sine = angle * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0)))
-    cosine = 1.0 - 0.5 * a2 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0)))
-    c, n = s.cos, s.sin
-    s.cos = c * cosine - n * sine
-    s.sin = n * cosine + c * sine
-
-
-@compiled
-def conduct(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
-    """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
-
-    J dw/dt = Kt (duty V - Ke w) / R - b w, stepped exactly: the back-EMF damps the shaft within 0.1 s.
-    """
-    free = c.keep * speed
-    driven = free + c.drive_gain * duty * voltage
-    if c.ripple != 0.0:
-        driven += c.ripple * math.sin(p.ripple_cycles * angle + p.ripple_phase)
-    # Firmware may take power away to hold the limit, not reverse it.
-    driven = min(driven, max(p.speed_limit, free))
-    return max(driven, min(-p.speed_limit, free))
-
-
-@compiled
-def effective_duty(duty: float, gain: float, p: Any) -> float:
-    """Return the share of the supply that reaches a motor: dead band, then gain by side and direction."""
-    if abs(duty) < p.dead_band:
-        return 0.0
-    past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
-    direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
-    return past * gain * direction
-
-
-@compiled
-def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any) -> float:
-    """Return the largest impulse [N m s] dry friction can give a shaft in one step."""
-    budget = c.sliding
-    if p.static_friction != 0.0:
-        ratio = speed / p.stribeck_speed
-        budget += p.static_friction * c.dt * math.exp(-ratio * ratio)
-    ratio = p.friction_ratio if speed > 0.0 else -p.friction_ratio
-    return budget * (1.0 + ratio) + p.rolling_resistance * load * radius * c.dt
-
-
-@compiled
-def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
-    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air."""
-    driven = conduct(duty, voltage, angle, speed, p, c)
-    budget = friction_budget(driven, 0.0, 0.0, p, c) * c.inv_rotor
-    return driven - min(max(driven, -budget), budget)
-
-
-@compiled
-def supply(s: Any, p: Any, c: Any) -> float:
-    """Return the battery's terminal voltage [V] under the last step's current."""
-    return p.voltage * p.supply_scale - p.battery_drain * s.t - p.battery_resistance * s.battery_current
-
-
-@compiled
-def motor_current(duty: float, voltage: float, speed: float, p: Any) -> float:
-    """Return a motor's current [A]."""
-    return (duty * voltage - p.back_emf_constant * speed) / p.resistance
-
-
-@compiled
-def slewed(duty: float, last: float, c: Any) -> float:
-    """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
-    return min(max(duty, last - c.slew), last + c.slew)
-
-
-@compiled
-def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
-    """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
-
-    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant; the
-    integral stops where the duty saturates. The brick's own gains are not published in these terms.
-    """
-    error = command * FULL_SPEED - speed
-    wanted = c.regulator_p * error + integral
-    duty = min(max(wanted, -1.0), 1.0)
-    if duty == wanted:
-        integral += c.regulator_i * error
-    return duty, integral
-
-
-@compiled
-def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
-    """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
-
-    The gap leaves the slips that do not close it within the step alone. Without play the slip is returned as it is.
-    """
-    low = -(c.play + play) * radius / c.dt
-    high = (c.play - play) * radius / c.dt
-    if push > 0.0:
-        return slip - high
-    if push < 0.0:
-        return slip - low
-    return slip - min(max(slip, low), high)
-
-
-@compiled
-def _one_way(new: float, old: float, end: float) -> float:
-    """Keep a gear's push from changing sides within a sweep, and from acting inside the gap."""
-    if old > 0.0:
-        return max(new, 0.0)
-    if old < 0.0:
-        return min(new, 0.0)
-    return new if new * end > 0.0 else 0.0
 
 
 @compiled
@@ -297,16 +60,41 @@ def step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
     s.right_angle += s.right_speed * c.dt
     left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
     right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
-    s.battery_current = left + right
+    # A motor that brakes does not charge the battery: the practice case with a sagging battery says so.
+    s.battery_current = max(left, 0.0) + max(right, 0.0)
     s.vx = s.u * s.cos - s.w * s.sin
     s.vy = s.u * s.sin + s.w * s.cos
     s.t += c.dt
 
 
 @compiled
+def drift(s: Any, c: Any) -> None:
+    """Move the body with its new velocity: what the rigid-body engine does where there is nothing to touch."""
+    s.x += s.vx * c.dt
+    s.y += s.vy * c.dt
+    s.heading += s.yaw_rate * c.dt
+    turn(s, 0.5 * c.dt * s.yaw_rate)
+
+
+@compiled
+def turn(s: Any, angle: float) -> None:
+    """Turn the heading's cosine and sine by a small angle [rad].
+
+    By series: no library call in the inner loop, and the same bits on every machine. The error is below 1e-16 for
+    angles under 0.1 rad.
+    """
+    a2 = angle * angle
+    sine = angle * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0)))
+    cosine = 1.0 - 0.5 * a2 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0)))
+    c, n = s.cos, s.sin
+    s.cos = c * cosine - n * sine
+    s.sin = n * cosine + c * sine
+
+
+@compiled
 def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
     """Turn commands into the shafts' free speeds."""
-    s.voltage = supply(s, p, c)
+    s.voltage = supply(s, p)
     if p.regulated != 0.0:
         left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
@@ -315,7 +103,7 @@ def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> 
     s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
     s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
     s.left_speed = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c)
-    s.right_speed = conduct(s.right_drive, s.voltage, s.right_angle, s.right_speed, p, c)
+    s.right_speed = conduct(s.right_drive, s.voltage, s.right_angle + p.ripple_lead, s.right_speed, p, c)
 
 
 @compiled
@@ -346,8 +134,8 @@ def _grip(s: Any, p: Any) -> float:
         dx = s.x - p.com_ahead * s.cos - p.patch_x
         dy = s.y - p.com_ahead * s.sin - p.patch_y
         if dx * dx + dy * dy < p.patch_radius * p.patch_radius:
-            return p.patch_friction  # type: ignore[no-any-return]
-    return p.tyre_friction  # type: ignore[no-any-return]
+            return p.patch_friction
+    return p.tyre_friction
 
 
 @compiled
@@ -425,6 +213,31 @@ def _roll(s: Any, c: Any) -> bool:
 
 
 @compiled
+def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
+    """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
+
+    The gap leaves the slips that do not close it within the step alone. Without play the slip is returned as it is.
+    """
+    low = -(c.play + play) * radius / c.dt
+    high = (c.play - play) * radius / c.dt
+    if push > 0.0:
+        return slip - high
+    if push < 0.0:
+        return slip - low
+    return slip - min(max(slip, low), high)
+
+
+@compiled
+def _one_way(new: float, old: float, end: float) -> float:
+    """Keep a gear's push from changing sides within a sweep, and from acting inside the gap."""
+    if old > 0.0:
+        return max(new, 0.0)
+    if old < 0.0:
+        return min(new, 0.0)
+    return new if new * end > 0.0 else 0.0
+
+
+@compiled
 def _within_circle(
     push: float, side: float, circle: float, slide_push: float, slide_side: float
 ) -> tuple[float, float, bool]:
@@ -487,12 +300,3 @@ def _close_play(s: Any, c: Any) -> None:
         right = s.right_play + c.dt * (s.right_speed - (s.u + s.yaw_rate * c.half_track) / c.right_radius)
         s.left_play = min(max(left, -c.play), c.play)
         s.right_play = min(max(right, -c.play), c.play)
-
-
-@compiled
-def drift(s: Any, c: Any) -> None:
-    """Move the body with its new velocity: what the rigid-body engine does where there is nothing to touch."""
-    s.x += s.vx * c.dt
-    s.y += s.vy * c.dt
-    s.heading += s.yaw_rate * c.dt
-    turn(s, 0.5 * c.dt * s.yaw_rate)

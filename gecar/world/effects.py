@@ -78,7 +78,9 @@ class Effect:
 
 
 _P = Parameter
-_LAW_MOTOR = "brushed DC motor with gearbox: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
+_LAW_MOTOR = (
+    "brushed DC motor with gearbox: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
+)
 _EV3_FITS = "step fits of five EV3 motors: Coulomb 13-50 deg/s equivalent, forward and backward 5 % apart"
 _TYRE = "Coulomb friction circle; Pacejka, Tire and Vehicle Dynamics, ch. 1"
 _GEOMETRY = "odometry error model; Borenstein and Feng, IEEE T-RA 12(6), 1996"
@@ -131,7 +133,8 @@ CATALOGUE: tuple[Effect, ...] = (
     Effect("torque_ripple", "torque varies with the shaft's angle",
            (_P("ripple_amplitude", "amplitude_nm", "N m", 0.0, 0.1, 0.0, 0.003),
             _P("ripple_cycles", "cycles_per_rev", "1/rev", 1.0, 48.0, 1.0, 0.0),
-            _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0)),
+            _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0),
+            _P("ripple_lead", "right_lead_rad", "rad", -math.pi, math.pi, 0.0, 0.0)),
            ("motor",), "periodic in the shaft's angle", "cogging and gear mesh, first harmonic"),
     Effect("speed_limit", "firmware caps the speed",
            (_P("speed_limit", "speed_rad_s", "rad/s", 1.0, math.inf, math.inf, 0.0, 1.0, 11.0),),

@@ -11,13 +11,13 @@ Two steps, each of which can only make the time too short:
 
    speed up from rest as v(t) = v0 (1 - exp(-t / tau)), with the no-load speed v0 = r V / Ke and
    tau = (J + m r^2 / 2) R / (Kt Ke). Turning would add inertia; slip and friction would waste torque.
-   Dry friction T lowers the speed at which the torques balance to v1 = r (V - R T / Kt) / Ke: the centre never
-   goes faster. So its speed is at most min(v1, v(t)).
+   Dry friction T lowers the speed at which the torques balance to v1 = r (V - R T / Kt) / Ke: the centre
+   never goes faster. So its speed is at most min(v1, v(t)).
 
 The time is where the distance under that speed, integrated in closed form, equals the way's length.
 
-A drive is looked at once a step, so the centre may cut a tile's corner by a step's travel, under 1 mm; the bound
-counts the corner in full. The friction left out of the first step's rise is worth several times that.
+A drive is looked at once a step, so the centre may cut a tile's corner by a step's travel, under 1 mm; the
+bound counts the corner in full. The friction left out of the rise is worth several times that.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import lambertw
 
-from gecar.world.dynamics import GRAVITY
 from gecar.world.robot import Robot
+from gecar.world.state import GRAVITY
 
 
 class Sprint(NamedTuple):

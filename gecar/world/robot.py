@@ -42,7 +42,9 @@ class Body(_Section):
     def _stands(self) -> Body:
         share = self.com_ahead / self.caster_ahead if self.caster_ahead else -1.0
         if not 0.0 <= share < 1.0:
-            raise ValueError("a centre of mass between the axle and the caster (com_ahead / caster_ahead in [0, 1))")
+            raise ValueError(
+                "a centre of mass between the axle and the caster (com_ahead / caster_ahead in [0, 1))"
+            )
         return self
 
 
@@ -137,7 +139,11 @@ class Robot(_Section):
         own["regulated"] = 1.0 if self.drive.mode == "speed" else 0.0
         own["tyre_friction"] = self.tyre.friction
         sensor = self.colour_sensor
-        own |= {"sensor_ahead": sensor.ahead, "sensor_left": sensor.left, "spot_diameter": sensor.spot_diameter}
+        own |= {
+            "sensor_ahead": sensor.ahead,
+            "sensor_left": sensor.left,
+            "spot_diameter": sensor.spot_diameter,
+        }
         own |= {"white": sensor.white, "black": sensor.black, "side_sensor_left": sensor.side_left}
         return own
 
@@ -172,7 +178,9 @@ def _check_effect(effect_id: str, values: Mapping[str, float]) -> None:
             raise ValueError(f"found '{label}' in effect {effect_id}, expected one of {', '.join(labels)}")
         p = labels[label]
         if math.isnan(value) or not p.low <= value <= p.high:
-            raise ValueError(f"found {effect_id}.{label} = {value:g}, expected {p.low:g} to {p.high:g} {p.unit}")
+            raise ValueError(
+                f"found {effect_id}.{label} = {value:g}, expected {p.low:g} to {p.high:g} {p.unit}"
+            )
 
 
 def robot_from(table: Mapping[str, Any], where: str | Path) -> Robot:

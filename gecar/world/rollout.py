@@ -15,11 +15,11 @@ from gecar.language.opcodes import TEST
 from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
 from gecar.world.course import Course
 from gecar.world.driving import drive
-from gecar.world.dynamics import DERIVED, STATE, derive
-from gecar.world.interpreter import CONTROL, Eyes, Floor
+from gecar.world.interpreter import CONTROL, EYES, Floor
 from gecar.world.robot import Robot
-from gecar.world.sensing import RING
+from gecar.world.sensing import RING, spot_average
 from gecar.world.space import build_engine
+from gecar.world.state import DERIVED, STATE, derive
 
 STEP_S = 0.002  # benchmarks/convergence.py shows what halving it moves
 TRACE_S = 0.01
@@ -126,10 +126,10 @@ class World:
     def floor(self) -> Floor:
         """What kernels know of the course."""
         course = self.course
-        pitch = course.pitch_m
+        spot = float(self.robot.physics["spot_diameter"][0])
         return Floor(
-            course.raster(pitch),
-            pitch,
+            spot_average(course.raster(), course.pitch_m, spot),
+            course.pitch_m,
             course.tile_size_m,
             course.columns,
             course.rows,
@@ -188,9 +188,11 @@ class Driver:
         self.start = world.start
         self.limit = round(world.time_limit_s / world.step_s)
         self.obstacles: list[Any] = []
-        self._commands = np.zeros((2, RING))
-        self._rings = np.zeros((3, RING))
-        self._engine, self._buffer, self._count = NO_ENGINE, NO_BUFFER, NO_COUNT
+        self.commands = np.zeros(2 * RING)
+        self.eyes = np.zeros(1, EYES)
+        self.eyes["noise_pct"] = world.noise.sensor_pct
+        self.eyes["motor_noise"] = world.noise.motor_share
+        self.engine, self.buffer, self.count = NO_ENGINE, NO_BUFFER, NO_COUNT
 
     def simulate(self, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
         """Drive a program from START to its outcome.
@@ -204,10 +206,11 @@ class Driver:
         trace
             Whether to keep the time series.
         """
-        self._reset()
+        self.reset()
         every = round(TRACE_S / self.world.step_s)
         arrival = np.full(len(self.floor.sequence), np.nan)
-        eyes = Eyes(self._rings, sensors_used(opcodes), self.world.noise.sensor_pct, np.array([seed], np.uint64))
+        self.eyes["used"] = sensors_used(opcodes)
+        self.eyes["stream"] = seed
         samples = np.full((self.limit // every + 2 if trace else 0, len(TRACE_COLUMNS)), np.nan)
         poses: list[list[tuple[float, float, float]]] = []
         chunk = every if trace and self.obstacles else self.limit + 1
@@ -216,8 +219,8 @@ class Driver:
             poses.append([(*body.position, body.angle) for body in self.obstacles])
             outcome, n, passed = drive(
                 opcodes, self.physics, self.derived, self.state, self.control, self.floor, self.start,
-                n, n + chunk, self.limit, passed, self.world.noise.motor_share, eyes, self._commands,
-                self._engine, self._buffer, self._count, arrival, samples, every,
+                n, n + chunk, self.limit, passed, self.eyes, self.commands,
+                self.engine, self.buffer, self.count, arrival, samples, every,
             )  # fmt: skip
         checkpoints = min(passed, len(self.floor.sequence) - 1)
         kept = samples[~np.isnan(samples[:, 0])]
@@ -231,17 +234,18 @@ class Driver:
             np.array(poses)[: len(kept)] if trace and self.obstacles else None,
         )
 
-    def _reset(self) -> None:
+    def reset(self) -> None:
+        """Put everything that can be touched back where the course has it."""
         if self.world.uses_pymunk:
             x, y, heading = self.start
             self._keep, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)
-            self._engine, self._buffer, self._count = self._keep.addresses, self._keep.buffer, self._keep.count
+            self.engine, self.buffer, self.count = self._keep.addresses, self._keep.buffer, self._keep.count
 
 
 def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
     """Return which of the sensors (centre, left, right) a program reads, shape (3,)."""
     used = np.zeros(3, np.bool_)
-    used[np.unique(opcodes[opcodes[:, 0] == TEST, 1])] = True
+    used[opcodes[opcodes[:, 0] == TEST, 1]] = True
     return used
 
 

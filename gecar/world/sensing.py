@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.fft
 
 from gecar.compiled import compiled
 
@@ -31,8 +32,74 @@ def _disc_points() -> npt.NDArray[np.float64]:
 _DISC = _disc_points()
 
 
+def spot_average(raster: npt.NDArray[np.uint8], pitch: float, diameter: float) -> npt.NDArray[np.float32]:
+    """Average a floor over the spot around each cell's centre, so that a reading is one look-up.
+
+    The sums are whole numbers and rounded as such: the same bits on every machine.
+
+    Parameters
+    ----------
+    raster, pitch
+        Floor, shape (rows, columns), 255 bare and 0 line; size of a cell [m]. Around it the floor is bare.
+    diameter
+        The spot's [m].
+
+    Returns
+    -------
+    numpy.ndarray
+        Brightness 0..255, shape (rows, columns).
+    """
+    weights = _disc_weights(0.5 * spot_reach(pitch, diameter) / pitch)
+    n = len(weights) // 2
+    shape = [scipy.fft.next_fast_len(size + 2 * n, real=True) for size in raster.shape]
+    spectrum = scipy.fft.rfft2(255.0 - raster, shape) * scipy.fft.rfft2(weights, shape)
+    dark = np.rint(scipy.fft.irfft2(spectrum, shape)[n : n + raster.shape[0], n : n + raster.shape[1]])
+    return (255.0 - dark / weights.sum()).astype(np.float32)
+
+
+def _disc_weights(radius: float) -> npt.NDArray[np.float64]:
+    """Return how many of 20 x 20 points in each cell a disc around the middle one covers, shape (2n + 1, 2n + 1)."""
+    n = math.ceil(radius)
+    points = (np.arange((2 * n + 1) * 20) + 0.5) / 20.0 - (n + 0.5)
+    covered = points[:, None] ** 2 + points[None, :] ** 2 <= max(radius, 0.1) ** 2
+    return covered.reshape(2 * n + 1, 20, 2 * n + 1, 20).sum((1, 3)).astype(np.float64)
+
+
 @compiled
-def floor_brightness(raster: npt.NDArray[np.uint8], pitch: float, x: float, y: float) -> float:
+def spot_reach(pitch: float, diameter: float) -> float:
+    """Return the diameter [m] to average over for a spot: cells blur by themselves.
+
+    A bilinear look-up of square cells spreads a point with variance pitch^2 (1/12 + 1/6) an axis, as a disc of
+    diameter 2 pitch does; variances add, so the spot gives that much up.
+    """
+    return math.sqrt(max(diameter * diameter - 4.0 * pitch * pitch, 0.0))
+
+
+@compiled
+def glance(averaged: npt.NDArray[np.float32], pitch: float, s: Any, left: float, p: Any) -> float:
+    """Return what the sensor sees [%], before lag, delay and noise, on a floor averaged by `spot_average`.
+
+    Parameters
+    ----------
+    averaged, pitch
+        Brightness, shape (rows, columns); size of a cell [m].
+    s, p
+        Records of dtypes `STATE` and `PHYSICS`.
+    left
+        How far this sensor sits to the left of its nominal place [m].
+    """
+    aside = p.sensor_left + left
+    ahead = p.sensor_ahead - p.com_ahead
+    x = s.x + ahead * s.cos - aside * s.sin - p.line_dx
+    y = s.y + ahead * s.sin + aside * s.cos - p.line_dy
+    if p.line_angle != 0.0:
+        cos, sin = math.cos(p.line_angle), math.sin(p.line_angle)
+        x, y = x * cos + y * sin, y * cos - x * sin
+    return p.black + (p.white - p.black) * floor_brightness(averaged, pitch, x, y) / 255.0
+
+
+@compiled
+def floor_brightness(raster: npt.NDArray[Any], pitch: float, x: float, y: float) -> float:
     """Return the floor's brightness at a point [m], 0 (line) to 255, bilinear; bare floor outside the field."""
     column = x / pitch - 0.5
     row = y / pitch - 0.5
@@ -46,14 +113,23 @@ def floor_brightness(raster: npt.NDArray[np.uint8], pitch: float, x: float, y: f
     i = int(i)
     below = (1.0 - right) * raster[i, j] + right * raster[i, j + 1]
     above = (1.0 - right) * raster[i + 1, j] + right * raster[i + 1, j + 1]
-    return (1.0 - up) * below + up * above  # type: ignore[no-any-return]
+    return (1.0 - up) * below + up * above
 
 
 @compiled
 def spot_reflection(
-    raster: npt.NDArray[np.uint8], pitch: float, x: float, y: float, cos: float, sin: float, left: float, p: Any
+    raster: npt.NDArray[np.uint8],
+    pitch: float,
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    left: float,
+    p: Any,
 ) -> float:
-    """Return what the sensor sees [%], before lag, delay and noise.
+    """Return what the sensor sees [%], before lag, delay and noise, averaging the spot on the way.
+
+    For fits, where spot, place and floor may differ from call to call; drives `glance`.
 
     Parameters
     ----------
@@ -68,8 +144,7 @@ def spot_reflection(
     """
     ahead = p.sensor_ahead
     aside = p.sensor_left + left
-    # Bilinear cells blur like a disc of their own, of variance pitch^2/4 an axis: the spot gives that much up.
-    radius = 0.5 * math.sqrt(max(p.spot_diameter * p.spot_diameter - 4.0 * pitch * pitch, 0.0))
+    radius = 0.5 * spot_reach(pitch, p.spot_diameter)
     # The course may lie displaced: look where the floor under the spot is drawn.
     turn_cos = math.cos(p.line_angle)
     turn_sin = math.sin(p.line_angle)
@@ -81,7 +156,7 @@ def spot_reflection(
         py = y + u * sin + w * cos - p.line_dy
         total += floor_brightness(raster, pitch, px * turn_cos + py * turn_sin, py * turn_cos - px * turn_sin)
     share = total / (255.0 * _DISC.shape[0])
-    return p.black + (p.white - p.black) * share  # type: ignore[no-any-return]
+    return p.black + (p.white - p.black) * share
 
 
 @compiled
@@ -104,9 +179,14 @@ def lag_keep(dt: float, time_constant: float) -> float:
 
 
 @compiled
-def delayed(ring: npt.NDArray[np.float64], newest: int, steps: float) -> float:
-    """Return a ring's value ``steps`` (any real number) before the newest, linear between entries."""
-    whole = math.floor(steps)
+def delayed(rings: npt.NDArray[np.float64], ring: int, newest: int, steps: float) -> float:
+    """Return a value ``steps`` (any real number) before the newest, linear between entries.
+
+    ``rings``, shape (k * RING,), holds several rings; this one begins at ``ring``.
+    """
+    whole = int(steps)
     part = steps - whole
-    last = newest - int(whole)
-    return (1.0 - part) * ring[last & (RING - 1)] + part * ring[(last - 1) & (RING - 1)]  # type: ignore[no-any-return]
+    last = newest - whole
+    newer = rings[ring + (last & (RING - 1))]
+    older = rings[ring + ((last - 1) & (RING - 1))]
+    return (1.0 - part) * newer + part * older

@@ -29,7 +29,7 @@ _EPS = 1e-12
 
 
 class Portal(NamedTuple):
-    """A shared edge on the way: its ends, as seen when driving over it [m]."""
+    """A shared edge on the way: its ends as seen when driving over it, in tiles: corners are exact."""
 
     left: Place
     right: Place
@@ -54,12 +54,13 @@ def shortest_way(layout: Layout, start: int, sequence: Sequence[int], x_m: float
     x_m, y_m
         START, on its tile [m].
     """
-    parts = _parts(layout, _with_tiles_between(layout, start, sequence))
-    ways = [_pull_tight([_portal(layout, a, b) for a, b in pairwise(part)]) for part in parts[1:]]
-    ways.insert(0, _pull_tight([_portal(layout, a, b) for a, b in pairwise(parts[0])], (x_m, y_m)))
-    jumps = [layout.square(a[-1]).distance(layout.square(b[0])) for a, b in pairwise(parts)]
-    points = [point for way in ways for point in way]
-    length = sum(jumps) + sum(math.dist(a, b) for way in ways for a, b in pairwise(way))
+    size = layout.tile_size_m
+    first, *rest = _parts(layout, _with_tiles_between(layout, start, sequence))
+    ways = [_pull_tight([_portal(layout, a, b) for a, b in pairwise(first)], (x_m / size, y_m / size))]
+    ways += [_pull_tight([_portal(layout, a, b) for a, b in pairwise(part)]) for part in rest]
+    jumps = [layout.square(a[-1]).distance(layout.square(b[0])) for a, b in pairwise([first, *rest])]
+    points = [(x * size, y * size) for way in ways for x, y in way]
+    length = sum(jumps) + size * sum(math.dist(a, b) for way in ways for a, b in pairwise(way))
     return ShortestWay(LineString(points if len(points) > 1 else points * 2), length)
 
 
@@ -119,12 +120,10 @@ def _parts(layout: Layout, chain: list[int]) -> list[list[int]]:
 
 def _portal(layout: Layout, before: int, after: int) -> Portal:
     side = next(s for s in Side if layout.neighbour(before, s) == after)
-    (x, y), half = layout.centre_m(before), 0.5 * layout.tile_size_m
-    columns, rows = side.step
-    return Portal(
-        (x + half * (columns - rows), y + half * (rows + columns)),
-        (x + half * (columns + rows), y + half * (rows - columns)),
-    )
+    (column, row), (columns, rows) = layout.place(before), side.step
+    corners = (1 + columns - rows, 1 + rows + columns), (1 + columns + rows, 1 + rows - columns)
+    left, right = ((column + x // 2, row + y // 2) for x, y in corners)
+    return Portal(left, right)
 
 
 def _pull_tight(portals: list[Portal], origin: Place | None = None) -> list[Place]:

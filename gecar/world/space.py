@@ -6,16 +6,18 @@ import pymunk
 
 from gecar.world.chipmunk import Engine, make_engine
 from gecar.world.course import Course
-from gecar.world.dynamics import GRAVITY
 from gecar.world.obstacle import Obstacle
 from gecar.world.robot import Robot
+from gecar.world.state import GRAVITY
 
 WALL_RADIUS_M = 0.005
 ROBOT_FRICTION = 0.4  # plastic on plastic
 WALL_FRICTION = 0.5
 
 
-def build_engine(robot: Robot, course: Course, x: float, y: float, heading: float) -> tuple[Engine, list[pymunk.Body]]:
+def build_engine(
+    robot: Robot, course: Course, x: float, y: float, heading: float
+) -> tuple[Engine, list[pymunk.Body]]:
     """Make a fresh space with the robot's axle centre at a pose [m, m, rad].
 
     Returns

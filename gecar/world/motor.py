@@ -1,0 +1,88 @@
+"""Motors, gears and battery: pure compiled functions from duty to a shaft's speed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gecar.compiled import compiled
+
+# rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
+FULL_SPEED = math.radians(1000.0)
+
+
+@compiled
+def conduct(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
+    """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
+
+    J dw/dt = Kt (duty V - Ke w) / R - b w, stepped exactly: the back-EMF damps the shaft within 0.1 s.
+    """
+    free = c.keep * speed
+    driven = free + c.drive_gain * duty * voltage
+    if c.ripple != 0.0:
+        driven += c.ripple * math.sin(p.ripple_cycles * angle + p.ripple_phase)
+    # Firmware may take power away to hold the limit, not reverse it.
+    driven = min(driven, max(p.speed_limit, free))
+    return max(driven, min(-p.speed_limit, free))
+
+
+@compiled
+def effective_duty(duty: float, gain: float, p: Any) -> float:
+    """Return the share of the supply that reaches a motor: dead band, then gain by side and direction."""
+    if abs(duty) < p.dead_band:
+        return 0.0
+    past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
+    direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
+    return past * gain * direction
+
+
+@compiled
+def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any) -> float:
+    """Return the largest impulse [N m s] dry friction can give a shaft in one step."""
+    budget = c.sliding
+    if p.static_friction != 0.0:
+        ratio = speed / p.stribeck_speed
+        budget += p.static_friction * c.dt * math.exp(-ratio * ratio)
+    ratio = p.friction_ratio if speed > 0.0 else -p.friction_ratio
+    return budget * (1.0 + ratio) + p.rolling_resistance * load * radius * c.dt
+
+
+@compiled
+def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
+    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air."""
+    driven = conduct(duty, voltage, angle, speed, p, c)
+    budget = friction_budget(driven, 0.0, 0.0, p, c) * c.inv_rotor
+    return driven - min(max(driven, -budget), budget)
+
+
+@compiled
+def supply(s: Any, p: Any) -> float:
+    """Return the battery's terminal voltage [V] under the last step's current."""
+    return p.voltage * p.supply_scale - p.battery_drain * s.t - p.battery_resistance * s.battery_current
+
+
+@compiled
+def motor_current(duty: float, voltage: float, speed: float, p: Any) -> float:
+    """Return a motor's current [A]."""
+    return (duty * voltage - p.back_emf_constant * speed) / p.resistance
+
+
+@compiled
+def slewed(duty: float, last: float, c: Any) -> float:
+    """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
+    return min(max(duty, last - c.slew), last + c.slew)
+
+
+@compiled
+def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
+    """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
+
+    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant; the
+    integral stops where the duty saturates. The brick's own gains are not published in these terms.
+    """
+    error = command * FULL_SPEED - speed
+    wanted = c.regulator_p * error + integral
+    duty = min(max(wanted, -1.0), 1.0)
+    if duty == wanted:
+        integral += c.regulator_i * error
+    return duty, integral
