@@ -1,0 +1,123 @@
+"""The printed line as plain geometry, and the sensor that looks at it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from benchmarks.concealed.drive_train import TICK_S
+from benchmarks.concealed.robot import Concealed
+
+# The paper's course: 8 x 4 tiles of 0.30 m, a line 25 mm wide through the centres of the 20 rim tiles, sharp corners.
+TILE = 0.30  # m
+FIELD = (2.4, 1.2)  # m
+LINE_WIDTH = 0.025  # m
+_HALF = LINE_WIDTH / 2.0
+_OUTER = (0.15 - _HALF, 0.15 - _HALF, 2.25 + _HALF, 1.05 + _HALF)  # x0, y0, x1, y1
+_INNER = (0.15 + _HALF, 0.15 + _HALF, 2.25 - _HALF, 1.05 - _HALF)
+_SLICES = 24
+
+
+def line_share(x: float, y: float, diameter: float) -> float:
+    """Share of a round spot that lies on the line.
+
+    Parameters
+    ----------
+    x, y
+        Middle of the spot in the course's frame [m].
+    diameter
+        Of the spot [m].
+
+    Returns
+    -------
+    float
+        0 on bare floor, 1 on the line. Exact along the sides; by slices at the corners, within 0.002.
+    """
+    radius = diameter / 2.0
+    return _share_inside(_OUTER, x, y, radius) - _share_inside(_INNER, x, y, radius)
+
+
+def _share_inside(box: tuple[float, float, float, float], x: float, y: float, radius: float) -> float:
+    """Share of a disc inside a rectangle much larger than itself."""
+    across = (
+        min(x - box[0], box[2] - x) / radius
+    )  # distance to the nearer upright side, in radii, inside positive
+    along = min(y - box[1], box[3] - y) / radius
+    if across <= -1.0 or along <= -1.0:
+        return 0.0
+    if along >= 1.0:
+        return _beyond_chord(across)
+    if across >= 1.0:
+        return _beyond_chord(along)
+    return _corner(across, along)
+
+
+def _beyond_chord(distance: float) -> float:
+    """Share of a unit disc on the inner side of a straight edge."""
+    if distance >= 1.0:
+        return 1.0
+    return 1.0 - (math.acos(distance) - distance * math.sqrt(1.0 - distance * distance)) / math.pi
+
+
+def _corner(across: float, along: float) -> float:
+    """Share of a unit disc within a right angle whose sides pass at these distances."""
+    first = math.acos(across)
+    width = (math.pi - first) / _SLICES  # equal angles: slices narrow towards the rim, as the chord does
+    area = 0.0
+    for k in range(_SLICES):
+        chord = math.sin(first + (k + 0.5) * width)
+        area += max(min(along, chord) + chord, 0.0) * chord
+    return area * width / math.pi
+
+
+class ColourSensor:
+    """Reflected light, one tick at a time, before noise and rounding.
+
+    Parameters
+    ----------
+    concealed
+        What differs from the nominal sensor and the course as drawn.
+    """
+
+    def __init__(self, concealed: Concealed) -> None:
+        self._hidden = concealed
+        self._waiting = deque([100.0] * round(concealed.sensor_delay / TICK_S))
+        self._level = math.nan
+        lag = concealed.sensor_lag
+        self._follow = 1.0 - math.exp(-TICK_S / lag) if lag > 0.0 else 1.0
+
+    def look(self, x: float, y: float, heading: float) -> float:
+        """Read the floor.
+
+        Parameters
+        ----------
+        x, y, heading
+            Pose of the axle's centre [m, m, rad].
+
+        Returns
+        -------
+        float
+            Reflection [%]; may leave 0-100 by gain and offset, as the reading itself can't.
+        """
+        seen = self._floor(x, y, heading)
+        if math.isnan(self._level):  # it has looked at this floor since before the recording
+            self._level, self._waiting = seen, deque([seen] * len(self._waiting))
+        self._waiting.append(seen)
+        self._level += self._follow * (self._waiting.popleft() - self._level)
+        return self._hidden.sensor_gain * self._level + self._hidden.sensor_offset_pct
+
+    def _floor(self, x: float, y: float, heading: float) -> float:
+        hidden = self._hidden
+        cos, sin = math.cos(heading), math.sin(heading)
+        spot_x = x + cos * hidden.sensor_ahead - sin * hidden.sensor_left
+        spot_y = y + sin * hidden.sensor_ahead + cos * hidden.sensor_left
+        dx, dy, angle = hidden.line_shift
+        if (dx, dy, angle) != (0.0, 0.0, 0.0):
+            cos, sin = math.cos(angle), math.sin(angle)
+            spot_x, spot_y = spot_x - dx, spot_y - dy
+            spot_x, spot_y = cos * spot_x + sin * spot_y, cos * spot_y - sin * spot_x
+        light = 100.0 * (1.0 - line_share(spot_x, spot_y, hidden.spot_diameter))
+        if hidden.ambient is not None:
+            loss, source = hidden.ambient
+            light *= 1.0 - loss * (1.0 - math.cos(heading - source)) / 2.0
+        return light

@@ -1,0 +1,153 @@
+"""How visible is what a case conceals? Computed from the sealed pairs of worlds, whatever any tool made of the case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.recording import ANGLES, CHANNELS, NOISE, POSE, Conditions, camera_rows
+from benchmarks.concealed.truth import Array
+
+Rows = npt.NDArray[np.intp]
+
+WINDOW_ROWS = 200  # 2 s: the longest windows that replays are re-based in
+_STEP = {
+    "left_angle_deg": 1.0,
+    "right_angle_deg": 1.0,
+    "reflection_pct": 1.0,
+    "yaw_rate_dps": 0.1,
+}  # of rounding
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """Whitened difference between two worlds, under one case's noise, columns and camera rate.
+
+    ``energy`` (runs, rows, channels) is its square, in the order of ``CHANNELS``; rows without a sample hold 0.
+    """
+
+    energy: Array
+
+    @property
+    def d_prime(self) -> float:
+        """Size of the difference in standard deviations of the best linear detector."""
+        return math.sqrt(float(self.energy.sum()))
+
+    def by_channel(self) -> dict[str, float]:
+        """Give the share of the energy in each channel."""
+        total = max(float(self.energy.sum()), 1e-300)
+        return {name: float(self.energy[:, :, k].sum()) / total for k, name in enumerate(CHANNELS)}
+
+
+def visibility(
+    worlds: Mapping[str, Array],
+    with_it: str,
+    without_it: str,
+    conditions: Conditions,
+    window_rows: int = WINDOW_ROWS,
+) -> Visibility:
+    """Compare two worlds that were given the same commands.
+
+    Parameters
+    ----------
+    worlds
+        The sealed arrays: ``runK_NAME`` (rows, channels), noise-free.
+    with_it, without_it
+        Names of the two worlds: ``on`` and ``off``, or ``on`` and ``without_ID``.
+    conditions
+        The case's noise, columns and camera rate.
+    window_rows
+        The pose and the angles are re-based this often, so that a difference counts where it arises.
+
+    Returns
+    -------
+    Visibility
+        What remains after the nuisances of each window, start pose and start angles, are projected out.
+    """
+    runs = sum(1 for name in worlds if name.endswith("_on"))
+    energies = []
+    for run in range(runs):
+        there = np.asarray(worlds[f"run{run}_{with_it}"], dtype=np.float64)
+        name = f"run{run}_{without_it}"
+        absent = np.asarray(worlds[name], dtype=np.float64) if name in worlds else there
+        energies.append(_run_energy(there, absent, conditions, window_rows))
+    return Visibility(np.stack(energies))
+
+
+def _run_energy(there: Array, absent: Array, conditions: Conditions, window_rows: int) -> Array:
+    energy = np.zeros_like(there)
+    frames = camera_rows(len(there), conditions.camera_hz) > 0.0
+    for first in range(0, len(there) - window_rows, window_rows):
+        rows = np.arange(first, first + window_rows)
+        for k, name in enumerate(CHANNELS):
+            if name in POSE or name not in conditions.columns:
+                continue
+            difference = _clipped(name, there[rows, k]) - _clipped(name, absent[rows, k])
+            nuisance = np.ones((window_rows, 1)) if name in ANGLES else np.zeros((window_rows, 0))
+            white = _whitener(name, tuple(range(window_rows)), conditions)
+            energy[rows, k] = _remainder(white @ difference, white @ nuisance) ** 2
+        if set(POSE) <= set(conditions.columns):
+            seen = rows[frames[rows]]
+            energy[seen[:, None], _POSE_AT] = _pose_energy(
+                there[rows], absent[rows], seen - first, conditions
+            )
+    return energy
+
+
+_POSE_AT = np.array([CHANNELS.index(name) for name in POSE])
+
+
+def _pose_energy(there: Array, absent: Array, seen: Rows, conditions: Conditions) -> Array:
+    """Move one path onto the other's start, then project out what a wrong start pose would do."""
+    here, other = there[:, _POSE_AT], absent[:, _POSE_AT]
+    turn = math.radians(here[0, 2] - other[0, 2])
+    arm = other[:, :2] - other[0, :2]
+    spun = np.column_stack(
+        [
+            math.cos(turn) * arm[:, 0] - math.sin(turn) * arm[:, 1],
+            math.sin(turn) * arm[:, 0] + math.cos(turn) * arm[:, 1],
+        ]
+    )
+    moved = np.column_stack([here[0, :2] + spun, here[0, 2] + other[:, 2] - other[0, 2]])
+    difference, path = (here - moved)[seen], spun[seen]
+    one, none = np.ones(len(seen)), np.zeros(len(seen))
+    slopes = [[one, none, none], [none, one, none], [-path[:, 1], path[:, 0], math.degrees(1.0) * one]]
+    whites = [_whitener(name, tuple(seen.tolist()), conditions) for name in POSE]
+    signal = np.concatenate([white @ difference[:, k] for k, white in enumerate(whites)])
+    nuisance = np.stack(
+        [np.concatenate([white @ c[k] for k, white in enumerate(whites)]) for c in slopes], axis=1
+    )
+    return _remainder(signal, nuisance).reshape(3, -1).T ** 2
+
+
+def _remainder(signal: Array, nuisance: Array) -> Array:
+    if nuisance.shape[1] == 0:
+        return signal
+    fitted: Array = nuisance @ np.linalg.lstsq(nuisance, signal, rcond=None)[0]
+    return signal - fitted
+
+
+def _whitener(name: str, rows: tuple[int, ...], conditions: Conditions) -> Array:
+    return _inverse_root(
+        name, rows, conditions.noise_level, conditions.coloured_share, conditions.coloured_time_s
+    )
+
+
+@cache
+def _inverse_root(name: str, rows: tuple[int, ...], level: float, share: float, time_s: float) -> Array:
+    """Inverse Cholesky factor of the noise covariance over these rows: sensor noise and rounding."""
+    variance = (NOISE.get(name, 0.0) * level) ** 2
+    apart = np.abs(np.subtract.outer(rows, rows)) * 0.01
+    covariance = variance * share * np.exp(-apart / time_s)
+    covariance += np.eye(len(rows)) * (variance * (1.0 - share) + _STEP.get(name, 0.0) ** 2 / 12.0)
+    inverse: Array = np.linalg.inv(np.linalg.cholesky(covariance))
+    return inverse
+
+
+def _clipped(name: str, column: Array) -> Array:
+    return np.clip(column, 0.0, 100.0) if name == "reflection_pct" else column

@@ -1,0 +1,156 @@
+"""From commands to shaft torques: firmware, battery and motors, one tick at a time."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from benchmarks.concealed.robot import (
+    BACK_EMF_CONSTANT,
+    DUTY_CAP,
+    RESISTANCE,
+    SUPPLY,
+    TORQUE_CONSTANT,
+    Concealed,
+)
+
+TICK_S = 0.001  # firmware, sensors and slow forces act at 1 kHz, the rigid bodies twice as fast
+
+_STALL_TORQUE_PER_VOLT = TORQUE_CONSTANT / RESISTANCE  # N m / V
+_LIMITER_GAIN = 20.0  # V s / rad: the speed limiter lets go of the whole supply within 0.4 rad/s
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What the motors do within one tick, left and right."""
+
+    torques: tuple[float, float]  # N m, on top of the joint's own damping and friction
+    friction: tuple[float, float]  # N m, budget of dry friction
+    terminal_v: float
+
+
+class DriveTrain:
+    """Both motors with their firmware.
+
+    Parameters
+    ----------
+    concealed
+        What differs from the nominal robot.
+    """
+
+    def __init__(self, concealed: Concealed) -> None:
+        self._hidden = concealed
+        waiting = round(concealed.actuation_delay / TICK_S)
+        self._queue = deque([(0.0, 0.0)] * waiting)
+        self._ramped = (0.0, 0.0)
+        gain = concealed.gain_difference / 2.0
+        self._gains = (1.0 - gain, 1.0 + gain)
+        self._varying_friction = concealed.static_friction > 0.0
+
+    def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
+        """Pass one tick's command through delay, ramp, cap and dead band.
+
+        Parameters
+        ----------
+        command_pct
+            Left and right duty [%].
+        time_s
+            Time since the recording began [s].
+
+        Returns
+        -------
+        tuple[float, float]
+            Share of the terminal voltage across each motor, signed.
+        """
+        for start, length in self._hidden.dropouts:
+            if start <= time_s < start + length:
+                command_pct = (0.0, 0.0)
+        self._queue.append(command_pct)
+        late = self._queue.popleft()
+        most = self._hidden.command_slew * TICK_S
+        if most < math.inf:
+            late = tuple(  # type: ignore[assignment]
+                old + min(max(new - old, -most), most) for old, new in zip(self._ramped, late, strict=True)
+            )
+            self._ramped = late
+        left, right = self._shaped(late[0]), self._shaped(late[1])
+        return left * self._gains[0], right * self._gains[1]
+
+    def drive(
+        self,
+        duties: tuple[float, float],
+        speeds: tuple[float, float],
+        angles: tuple[float, float],
+        time_s: float,
+    ) -> Drive:
+        """Compute torques from duties and the shafts' state.
+
+        Parameters
+        ----------
+        duties
+            As :meth:`duties` returns them.
+        speeds, angles
+            Of the left and right shaft [rad/s, rad].
+        time_s
+            Time since the recording began [s].
+
+        Returns
+        -------
+        Drive
+        """
+        terminal = self._terminal(duties, speeds, time_s)
+        torques = tuple(self._torque(i, duties[i] * terminal, speeds[i], angles[i]) for i in (0, 1))
+        friction = (self._friction(speeds[0]), self._friction(speeds[1]))
+        return Drive(torques, friction, terminal)  # type: ignore[arg-type]
+
+    def _shaped(self, duty_pct: float) -> float:
+        """Cap and dead band: a dead zone takes the band off the duty, a threshold only blocks what is below it."""
+        duty = min(max(duty_pct / 100.0, -DUTY_CAP), DUTY_CAP)
+        band = self._hidden.dead_band_pct / 100.0
+        if band == 0.0:
+            return duty
+        if abs(duty) < band:
+            return 0.0
+        return duty if self._hidden.dead_band_is_threshold else duty - math.copysign(band, duty)
+
+    def _terminal(self, duties: tuple[float, float], speeds: tuple[float, float], time_s: float) -> float:
+        """Voltage at the terminals: a chopper draws duty x motor current from a source behind a resistance."""
+        source = SUPPLY * self._hidden.supply_scale - self._hidden.battery_drain * time_s
+        inner = self._hidden.battery_resistance
+        if inner == 0.0:
+            return source
+        load = (duties[0] ** 2 + duties[1] ** 2) / RESISTANCE
+        back = BACK_EMF_CONSTANT * (duties[0] * speeds[0] + duties[1] * speeds[1]) / RESISTANCE
+        return (source + inner * back) / (1.0 + inner * load)
+
+    def _torque(self, side: int, volts: float, speed: float, angle: float) -> float:
+        hidden = self._hidden
+        if abs(speed) > hidden.speed_limit - 1.0:
+            volts = self._limited(volts, speed)
+        torque = _STALL_TORQUE_PER_VOLT * volts
+        if hidden.direction_gain != 0.0 and volts != 0.0:
+            torque *= 1.0 + math.copysign(hidden.direction_gain, volts)
+        if hidden.friction_ratio != 0.0:
+            torque -= (
+                hidden.friction_ratio * hidden.coulomb_friction
+            )  # shifts the budget to one side, also at rest
+        if hidden.ripple_torque != 0.0:
+            torque += hidden.ripple_torque * math.sin(
+                hidden.ripple_cycles * angle + hidden.ripple_phases[side]
+            )
+        return torque
+
+    def _limited(self, volts: float, speed: float) -> float:
+        """Take voltage away so that the motor's own torque never drives it above the limit; it may coast there."""
+        turn = math.copysign(1.0, speed)
+        holding = BACK_EMF_CONSTANT * abs(speed) + self._hidden.coulomb_friction / _STALL_TORQUE_PER_VOLT
+        allowed = holding + _LIMITER_GAIN * (self._hidden.speed_limit - abs(speed))
+        return turn * min(turn * volts, max(allowed, 0.0))
+
+    def _friction(self, speed: float) -> float:
+        """Dry friction's budget, with the Stribeck curve (exponent 2) where breaking away takes more."""
+        if not self._varying_friction:
+            return self._hidden.coulomb_friction
+        fading = math.exp(-((speed / self._hidden.stribeck_speed) ** 2))
+        return self._hidden.coulomb_friction + self._hidden.static_friction * fading

@@ -1,0 +1,150 @@
+"""Draw physics that no row of the catalogue describes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.concealed.effects import Rng, strength
+from benchmarks.concealed.robot import NEUTRAL, Concealed
+
+# One robot per recording: weather and radio differ from run to run, everything else is the same.
+Draw = Callable[[Rng, int], tuple[list[Concealed], dict[str, Any]]]
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A kind of physics outside the catalogue.
+
+    Parameters
+    ----------
+    words
+        What an honest report would have to describe.
+    draw
+        From randomness and a number of recordings to robots and the label's numbers.
+    needs
+        Columns without which it leaves no trace.
+    """
+
+    words: str
+    draw: Draw
+    needs: tuple[str, ...] = ()
+
+
+def _phase(rng: Rng) -> float:
+    return float(rng.uniform(-math.pi, math.pi))
+
+
+def _sign(rng: Rng) -> float:
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
+def _same(runs: int, numbers: dict[str, Any], **changes: Any) -> tuple[list[Concealed], dict[str, Any]]:
+    return [replace(NEUTRAL, **changes)] * runs, numbers
+
+
+def _off_centre(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    offset = strength(rng, 0.002, 0.006, 0.0)
+    return _same(runs, {"offset_m": offset}, off_centre=(offset, _phase(rng), _phase(rng)))
+
+
+def _oval(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    half = strength(rng, 0.0008, 0.003, 0.0)
+    return _same(runs, {"half_axes_differ_m": 2.0 * half}, oval=(half, _phase(rng), _phase(rng)))
+
+
+def _tether(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    x, y = float(rng.uniform(0.4, 2.0)), float(rng.uniform(0.2, 1.0))
+    stiffness = strength(rng, 0.5, 5.0, 0.0)
+    return _same(runs, {"x_m": x, "y_m": y, "n_per_m": stiffness}, tether=(x, y, stiffness))
+
+
+def _magnet(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    x, y, core = float(rng.uniform(0.9, 1.5)), float(rng.uniform(0.45, 0.75)), float(rng.uniform(0.10, 0.25))
+    pull = strength(rng, 0.5, 4.0, 0.0)
+    return _same(runs, {"x_m": x, "y_m": y, "core_m": core, "pull_n": pull}, magnet=(x, y, core, pull))
+
+
+def _waves(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    slope, length = strength(rng, 0.015, 0.10, 0.0), float(rng.uniform(0.2, 0.5))
+    return _same(
+        runs, {"slope_rad": slope, "length_m": length}, waves=(slope, length, _phase(rng), _phase(rng))
+    )
+
+
+def _gusts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    """Draw eight gusts a run, each from anywhere."""
+    force = strength(rng, 0.5, 4.0, 0.0)
+
+    def gust() -> tuple[float, float, float, float]:
+        way, length = _phase(rng), float(rng.uniform(0.15, 0.6))
+        return float(rng.uniform(0.3, 11.5)), length, force * math.cos(way), force * math.sin(way)
+
+    robots = [replace(NEUTRAL, gusts=tuple(gust() for _ in range(8))) for _ in range(runs)]
+    return robots, {"force_n": force}
+
+
+def _air_drag(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    drag = strength(rng, 2.0, 20.0, 0.0)
+    return _same(runs, {"n_s2_per_m2": drag}, air_drag=drag)
+
+
+def _bump(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    height, x, angle = (
+        strength(rng, 0.001, 0.004, 0.0),
+        float(rng.uniform(1.0, 1.4)),
+        float(rng.uniform(-0.6, 0.6)),
+    )
+    return _same(runs, {"height_m": height, "x_m": x, "angle_rad": angle}, bump=(height, x, angle))
+
+
+def _lens(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    """Bend the picture: at 1 m from the middle a pose is off by that many metres."""
+    bend = _sign(rng) * strength(rng, 0.03, 0.2, 0.0)
+    return _same(runs, {"per_m2": bend}, lens=bend)
+
+
+def _ambient(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    loss, source = strength(rng, 0.05, 0.4, 0.0), _phase(rng)
+    return _same(runs, {"loss": loss, "heading_rad": source}, ambient=(loss, source))
+
+
+def _pose_drift(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    rate = _sign(rng) * strength(rng, 0.1, 1.0, 0.0)
+    return _same(runs, {"deg_per_s": rate}, pose_drift_deg=rate)
+
+
+def _dropouts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    """Lose the radio link a few times a run."""
+    length, count = strength(rng, 0.05, 0.3, 0.0), int(rng.integers(4, 10))
+    robots = []
+    for _ in range(runs):
+        starts = np.sort(rng.uniform(0.3, 11.5, count))
+        robots.append(replace(NEUTRAL, dropouts=tuple((float(start), length) for start in starts)))
+    return robots, {"seconds": length, "per_run": count}
+
+
+_POSE = ("x_m", "y_m", "heading_deg")
+
+OUTSIDE: dict[str, Outside] = {
+    "off_centre_wheels": Outside(
+        "the wheels' tread is off-centre: it repeats with the wheel's angle", _off_centre
+    ),
+    "oval_wheels": Outside("the wheels are oval: their radius varies twice a turn", _oval),
+    "tether": Outside("a spring-like cable pulls towards one point", _tether),
+    "magnet": Outside("something pulls towards one place on the floor, and only near it", _magnet),
+    "wavy_floor": Outside("the floor's slope changes from place to place", _waves),
+    "gusts": Outside("pushes that come and go with time, unlike from run to run", _gusts),
+    "air_drag": Outside("a drag on the body that grows with the square of the speed", _air_drag),
+    "floor_ridge": Outside("a ridge across the floor that wheels and caster climb", _bump),
+    "camera_lens": Outside(
+        "the pose is wrong by an amount that grows towards the field's edge", _lens, _POSE
+    ),
+    "ambient_light": Outside("the reading depends on the heading", _ambient, ("reflection_pct",)),
+    "pose_drift": Outside("the pose's frame turns slowly", _pose_drift, _POSE),
+    "radio_dropouts": Outside("commands are lost for moments", _dropouts),
+}

@@ -1,0 +1,99 @@
+"""The nominal robot, written down a second time, and what may be concealed in it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+# The numbers of the nominal EV3 robot that recordings assume. Copied by hand, so that no code has to be shared.
+MASS = 0.75  # kg, everything
+YAW_INERTIA = 0.0040  # kg m^2, everything, about the centre of mass
+CASTER_AHEAD = -0.085  # m
+TRACK_WIDTH = 0.120  # m
+WHEEL_RADIUS = 0.028  # m
+TORQUE_CONSTANT = 0.2746  # N m / A
+BACK_EMF_CONSTANT = 0.4731  # V s / rad
+RESISTANCE = 5.50  # ohm
+SHAFT_INERTIA = 0.00248  # kg m^2
+SUPPLY = 8.67  # V
+DUTY_CAP = 0.80
+GRAVITY = 9.81  # m / s^2
+
+# Not in the nominal robot's file, and hardly felt: a 3D robot needs them, a planar one does not.
+WHEEL_MASS = 0.02  # kg each; a LEGO 56 x 28 mm wheel with its axle
+CASTER_RADIUS = 0.010  # m
+CHASSIS_ROLL_INERTIA = 0.0015  # kg m^2
+CHASSIS_PITCH_INERTIA = 0.0030  # kg m^2
+
+
+@dataclass(frozen=True)
+class Concealed:
+    """What one robot hides. Every default is neutral: the nominal robot hides nothing.
+
+    Catalogue effects come first, then physics that no row of the catalogue describes. SI units, except where a
+    name ends in ``_pct`` or ``_deg``. Lengths and angles of the floor are in the course's frame.
+    """
+
+    coulomb_friction: float = 0.0165  # N m
+    viscous_friction: float = 0.0  # N m s / rad
+    static_friction: float = 0.0  # N m above Coulomb friction
+    stribeck_speed: float = 1.0  # rad / s
+    friction_ratio: float = 0.0  # forward friction x (1 + ratio), backward x (1 - ratio)
+    direction_gain: float = 0.0  # forward drive x (1 + gain), backward x (1 - gain)
+    backlash_deg: float = 0.0  # whole play between motor and wheel
+    dead_band_pct: float = 0.0
+    dead_band_is_threshold: bool = (
+        False  # False: dead zone, the output starts at 0; True: it starts at the band
+    )
+    inertia_scale: float = 1.0
+    actuation_delay: float = 0.0  # s
+    command_slew: float = math.inf  # % / s
+    gain_difference: float = 0.0  # right minus left, of the duty's voltage
+    supply_scale: float = 1.0
+    battery_resistance: float = 0.0  # ohm
+    battery_drain: float = 0.0  # V / s
+    ripple_torque: float = 0.0  # N m
+    ripple_cycles: int = 1  # per turn of the shaft
+    ripple_phases: tuple[float, float] = (0.0, 0.0)  # rad, left and right
+    speed_limit: float = math.inf  # rad / s
+    radius_scale: float = 1.0
+    radius_difference: float = 0.0  # right minus left, over the mean
+    track_scale: float = 1.0
+    tyre_friction: float = 0.9
+    patch: tuple[float, float, float, float] | None = None  # x, y, radius [m], coefficient
+    caster_friction: float = 0.0
+    rolling_resistance: float = 0.0
+    tilt: tuple[float, float] = (0.0, 0.0)  # rad, gravity's component along +x and +y
+    com_height: float = 0.050  # m
+    com_ahead: float = -0.0322  # m
+    sensor_lag: float = 0.0  # s
+    sensor_delay: float = 0.0  # s
+    sensor_gain: float = 1.0
+    sensor_offset_pct: float = 0.0
+    sensor_ahead: float = 0.081  # m
+    sensor_left: float = 0.0  # m
+    spot_diameter: float = 0.008  # m
+    line_shift: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # dx, dy [m], angle [rad] about the course's origin
+    clock_skew: float = 0.0  # log time = true time x (1 + skew)
+    pose_delay: float = 0.0  # s
+
+    # Outside the catalogue.
+    off_centre: tuple[float, float, float] | None = None  # m, phases left and right [rad]
+    oval: tuple[float, float, float] | None = None  # half the difference of the half axes [m], phases [rad]
+    tether: tuple[float, float, float] | None = None  # x, y [m], stiffness [N/m]
+    magnet: tuple[float, float, float, float] | None = None  # x, y, core radius [m], greatest pull [N]
+    waves: tuple[float, float, float, float] | None = None  # slope [rad], wave length [m], phases x, y [rad]
+    gusts: tuple[tuple[float, float, float, float], ...] = ()  # start, length [s], force x, y [N]
+    air_drag: float = 0.0  # N s^2 / m^2
+    bump: tuple[float, float, float] | None = None  # height [m], x [m], angle from +y [rad]
+    lens: float = 0.0  # 1/m^2, radial distortion of the camera about the field's centre
+    ambient: tuple[float, float] | None = None  # share of light lost, heading it comes from [rad]
+    pose_drift_deg: float = 0.0  # deg / s of heading in the pose, and of the path with it
+    dropouts: tuple[tuple[float, float], ...] = ()  # start, length [s]: no command reaches the motors
+
+
+NEUTRAL = Concealed()
