@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-GRAVITY, SWEEPS, DT = 9.81, 4, 0.002
+GRAVITY, SWEEPS, DT = 9.81, 3, 0.002
 
 
 def _turned(cos, sin, angle):
@@ -18,6 +18,13 @@ def _turned(cos, sin, angle):
 
 def _clip(value, limit):
     return min(max(value, -limit), limit)
+
+
+def _circled(push, side, circle, slide_push, slide_side):
+    if push * push + side * side <= circle * circle:
+        return push, side, False
+    scale = circle / math.sqrt(slide_push * slide_push + slide_side * slide_side + 1e-30)
+    return slide_push * scale, slide_side * scale, True
 
 
 def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold against the kernel
@@ -33,6 +40,9 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
     det = aside * (own * own - both * both) - cross * cross * (own + own + 2.0 * both)
     m_own, m_both = (own * aside - cross * cross) / det, -(both * aside + cross * cross) / det
     m_side, m_ss = cross * (both + own) / det, (own * own - both * both) / det
+    alone = own * aside - cross * cross
+    n_own, n_side, n_ss = aside / alone, cross / alone, own / alone
+    slides_l = slides_r = False
     weight, gain = body.mass * GRAVITY, DT * motor.torque_constant / (rotor * motor.resistance)
     dry, voltage, mass_w = motor.coulomb_friction * DT, robot.battery.voltage, 1.0 / own
     caster_static = weight * body.com_ahead / body.caster_ahead
@@ -41,10 +51,13 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
     pl = pr = ql = qr = 0.0
     out = np.empty((3, len(duties)))
     for n, (dl, dr) in enumerate(duties):
-        cos, sin = _turned(cos, sin, 0.5 * DT * yaw)
+        half = 0.5 * DT * yaw
+        cos, sin = _turned(cos, sin, half)
         u, w = vx * cos + vy * sin, vy * cos - vx * sin
         wl, wr = keep * wl + gain * dl * voltage, keep * wr + gain * dr * voltage
-        caster = min(max(caster_static + (pl + pr) / DT * (-body.com_height / body.caster_ahead), 0.0), weight)
+        caster = min(
+            max(caster_static + (pl + pr) / DT * (-body.com_height / body.caster_ahead), 0.0), weight
+        )
         wheel, shift = 0.5 * (weight - caster), (ql + qr) / DT * (body.com_height / body.track_width)
         loads = [min(max(wheel - shift, 0.0), 2.0 * wheel), min(max(wheel + shift, 0.0), 2.0 * wheel)]
         circles = [robot.tyre.friction * DT * load for load in loads]
@@ -55,33 +68,31 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
             settled = (abs(new_fl) == dry or new_fl == fl) and (abs(new_fr) == dry or new_fr == fr)
             fl, fr = new_fl, new_fr
             sl, sr, ss = wl * r - (u - yaw * a), wr * r - (u + yaw * a), -(w + yaw * e)
-            new_l = pl + (m_own * sl + m_both * sr + m_side * ss)
-            new_r = pr + (m_own * sr + m_both * sl + -m_side * ss)
-            side = ql + qr + (m_side * sl + -m_side * sr + m_ss * ss)
-            grip, slid, new = max(circles[0] + circles[1], 1e-30), False, []
-            for push, slip, old, old_side, circle in (
-                (new_l, sl, pl, ql, circles[0]),
-                (new_r, sr, pr, qr, circles[1]),
-            ):
-                part = side * (circle / grip)
-                if push * push + part * part > circle * circle:
-                    slid = True
-                    push, part = old + mass_w * slip, old_side + mass_w * ss  # noqa: PLW2901
-                    scale = circle / math.sqrt(push * push + part * part + 1e-30)
-                    push, part = push * scale, part * scale  # noqa: PLW2901
-                new.append((push, part))
-            (new_l, new_ql), (new_r, new_qr) = new
+            slide = [(pl + mass_w * sl, ql + mass_w * ss), (pr + mass_w * sr, qr + mass_w * ss)]
+            (new_l, new_ql), (new_r, new_qr) = slide
+            if not slides_l and not slides_r:
+                new_l = pl + (m_own * sl + m_both * sr + m_side * ss)
+                new_r = pr + (m_own * sr + m_both * sl + -m_side * ss)
+                side = m_side * sl + -m_side * sr + m_ss * ss
+                grip = max(circles[0] + circles[1], 1e-30)
+                new_ql, new_qr = ql + side * (circles[0] / grip), qr + side * (circles[1] / grip)
+            elif not slides_l:
+                new_l, new_ql = pl + (n_own * sl + n_side * ss), ql + (n_side * sl + n_ss * ss)
+            elif not slides_r:
+                new_r, new_qr = pr + (n_own * sr + -n_side * ss), qr + (-n_side * sr + n_ss * ss)
+            new_l, new_ql, slides_l = _circled(new_l, new_ql, circles[0], *slide[0])
+            new_r, new_qr, slides_r = _circled(new_r, new_qr, circles[1], *slide[1])
             more_l, more_r, more_s = new_l - pl, new_r - pr, (new_ql + new_qr) - (ql + qr)
             u, w = u + (more_l + more_r) * inv_m, w + more_s * inv_m
             yaw += ((more_r - more_l) * a + more_s * e) * inv_i
             wl, wr = wl - more_l * r * inv_j, wr - more_r * r * inv_j
             pl, pr, ql, qr = new_l, new_r, new_ql, new_qr
-            if settled and not slid:
+            if settled and not slides_l and not slides_r:
                 break
         u, w, yaw, wl, wr = (v if abs(v) > 1e-15 else 0.0 for v in (u, w, yaw, wl, wr))
         left += wl * DT
         vx, vy = u * cos - w * sin, u * sin + w * cos
         x, y, heading = x + vx * DT, y + vy * DT, heading + yaw * DT
-        cos, sin = _turned(cos, sin, 0.5 * DT * yaw)
+        cos, sin = _turned(cos, sin, yaw * DT - half)
         out[:, n] = x, y, left
     return out

@@ -45,7 +45,7 @@ def advance(
     late = p.actuation_delay / c.dt + 0.5
     step(s, delayed(commands, 0, n, late), delayed(commands, RING, n, late), p, c)
     if engine[SPACE] != 0:
-        turn(s, engine_step(s, c.dt, engine, buffer, count) - 0.5 * c.dt * s.yaw_rate)
+        turn(s, engine_step(s, c.dt, engine, buffer, count) - s.half_turn)
     else:
         drift(s, c)
 

@@ -5,7 +5,8 @@ to the left and right of its centre, and at the caster. Position and velocity ar
 
 One step solves, for both wheels at once, the impulses that would end all slip within the step, and clips them to each
 wheel's friction circle; dry friction is the torque that would stop the shaft within the step, clipped to its budget.
-Sticking then needs no special case. The same impulses, one step later, give the load transfer.
+Sticking then needs no special case. Beside a wheel that slid in the last sweep, the other one solves on its own. The
+same impulses, one step later, give the load transfer.
 
 Sources: projected Gauss-Seidel on impulses, Catto, GDC 2006; friction circle, Pacejka, Tire and Vehicle Dynamics,
 ch. 1; friction as a clipped stopping torque, Duclusaud et al. (BAM), 2024.
@@ -27,7 +28,7 @@ from gecar.world.motor import (
     supply,
 )
 
-SWEEPS = 4
+SWEEPS = 3
 STILL = 1e-15  # m/s and rad/s
 
 
@@ -46,7 +47,8 @@ def step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
         Records of dtypes `PHYSICS` and `DERIVED`.
     """
     # Solving along the heading at mid-step makes the path second order in the step.
-    turn(s, 0.5 * c.dt * s.yaw_rate)
+    s.half_turn = 0.5 * c.dt * s.yaw_rate
+    turn(s, s.half_turn)
     s.vx += c.tilt_x
     s.vy += c.tilt_y
     s.u = s.vx * s.cos + s.vy * s.sin
@@ -73,7 +75,7 @@ def drift(s: Any, c: Any) -> None:
     s.x += s.vx * c.dt
     s.y += s.vy * c.dt
     s.heading += s.yaw_rate * c.dt
-    turn(s, 0.5 * c.dt * s.yaw_rate)
+    turn(s, s.yaw_rate * c.dt - s.half_turn)
 
 
 @compiled
@@ -187,29 +189,33 @@ def _roll(s: Any, c: Any) -> bool:
     side_slip = -(s.w + s.yaw_rate * c.axle)
     end_l = separation(left_slip, s.left_push, s.left_play, c.left_radius, c)
     end_r = separation(right_slip, s.right_push, s.right_play, c.right_radius, c)
-    if c.play == 0.0 or (end_l != 0.0 and end_r != 0.0):
+    # As if both slid: each on its own.
+    slide_l, slide_ls = s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip
+    slide_r, slide_rs = s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip
+    left, left_side, right, right_side = slide_l, slide_ls, slide_r, slide_rs
+    free_l = s.left_slides != 0.0 or (c.play > 0.0 and end_l == 0.0)
+    free_r = s.right_slides != 0.0 or (c.play > 0.0 and end_r == 0.0)
+    if not free_l and not free_r:
+        # Where both hold, they share the side force as they share the load.
         left = s.left_push + (c.m_ll * end_l + c.m_lr * end_r + c.m_ls * side_slip)
         right = s.right_push + (c.m_rr * end_r + c.m_lr * end_l + c.m_rs * side_slip)
-        side = s.left_side + s.right_side + (c.m_ls * end_l + c.m_rs * end_r + c.m_ss * side_slip)
-    else:
-        left = s.left_push + c.left_mass * end_l
-        right = s.right_push + c.right_mass * end_r
-        side = s.left_side + s.right_side + c.side_mass * side_slip
+        side = c.m_ls * end_l + c.m_rs * end_r + c.m_ss * side_slip
+        grip = max(s.left_circle + s.right_circle, 1e-30)
+        left_side = s.left_side + side * (s.left_circle / grip)
+        right_side = s.right_side + side * (s.right_circle / grip)
+    elif not free_l:
+        left = s.left_push + (c.n_ll * end_l + c.n_ls * side_slip)
+        left_side = s.left_side + (c.n_ls * end_l + c.n_lss * side_slip)
+    elif not free_r:
+        right = s.right_push + (c.n_rr * end_r + c.n_rs * side_slip)
+        right_side = s.right_side + (c.n_rs * end_r + c.n_rss * side_slip)
     if c.play > 0.0:
-        left = _one_way(left, s.left_push, end_l)
-        right = _one_way(right, s.right_push, end_r)
-    # Where both tyres hold, they share the side force as they share the load.
-    grip = max(s.left_circle + s.right_circle, 1e-30)
-    left, left_side, slides = _within_circle(
-        left, side * (s.left_circle / grip), s.left_circle,
-        s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip,
-    )  # fmt: skip
-    right, right_side, slides_too = _within_circle(
-        right, side * (s.right_circle / grip), s.right_circle,
-        s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip,
-    )  # fmt: skip
+        left, slide_l = _one_way(left, s.left_push, end_l), _one_way(slide_l, s.left_push, end_l)
+        right, slide_r = _one_way(right, s.right_push, end_r), _one_way(slide_r, s.right_push, end_r)
+    left, left_side, s.left_slides = _within_circle(left, left_side, s.left_circle, slide_l, slide_ls)
+    right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
     _push(s, left, right, left_side, right_side, c)
-    return slides or slides_too or c.play > 0.0
+    return s.left_slides != 0.0 or s.right_slides != 0.0 or c.play > 0.0
 
 
 @compiled
@@ -240,12 +246,12 @@ def _one_way(new: float, old: float, end: float) -> float:
 @compiled
 def _within_circle(
     push: float, side: float, circle: float, slide_push: float, slide_side: float
-) -> tuple[float, float, bool]:
-    """Return a tyre's impulses, and whether it slides; a sliding tyre pulls along its slip, with all it has."""
+) -> tuple[float, float, float]:
+    """Return a tyre's impulses, and 1 if it slides, else 0; a sliding tyre pulls along its slip, with all it has."""
     if push * push + side * side <= circle * circle:
-        return push, side, False
+        return push, side, 0.0
     scale = circle / math.sqrt(slide_push * slide_push + slide_side * slide_side + 1e-30)
-    return slide_push * scale, slide_side * scale, True
+    return slide_push * scale, slide_side * scale, 1.0
 
 
 @compiled

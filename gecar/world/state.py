@@ -16,14 +16,15 @@ _STATE_FIELDS = (
     "t x y heading cos sin vx vy yaw_rate "
     "left_angle right_angle left_speed right_speed left_play right_play "
     "left_push right_push left_side right_side caster_push caster_side "
-    "left_friction right_friction left_duty right_duty left_integral right_integral battery_current "
+    "left_friction right_friction left_slides right_slides "
+    "left_duty right_duty left_integral right_integral battery_current "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
-    "u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
+    "half_turn u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
 )
 _DERIVED_FIELDS = (
     "dt mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain slew "
-    "m_ll m_lr m_rr m_ls m_rs m_ss left_mass right_mass side_mass caster_mass "
+    "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
     "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
 )
 
@@ -110,6 +111,11 @@ def _contact_masses(c: Any) -> None:
     c.m_ls = cross * (both + right) / determinant
     c.m_rs = -(cross * (both + left)) / determinant
     c.m_ss = (left * right - both * both) / determinant
+    # The same with the other wheel sliding: its impulse is then what its circle gives, whatever this one's is.
+    determinant = left * side - cross * cross
+    c.n_ll, c.n_ls, c.n_lss = side / determinant, cross / determinant, left / determinant
+    determinant = right * side - cross * cross
+    c.n_rr, c.n_rs, c.n_rss = side / determinant, -cross / determinant, right / determinant
     c.left_mass = 1.0 / left
     c.right_mass = 1.0 / right
     c.side_mass = 1.0 / side
@@ -123,6 +129,7 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.t = s.vx = s.vy = s.yaw_rate = for_zero
     s.left_angle = s.right_angle = s.left_speed = s.right_speed = s.left_play = s.right_play = for_zero
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = for_zero
+    s.left_slides = s.right_slides = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
     s.heading = heading
