@@ -127,15 +127,15 @@ def drive(
         k.row = k.due_step = k.line = 0
         k.until = -1
         k.due_ms = k.left_duty = k.right_duty = 0.0
-    tile = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+        k.tile = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
     remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
     for n in range(first, last):
         k.step = n
         now = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
         outcome = RUNNING
-        if now != tile:
-            tile = now
-            outcome, passed = _arrive(tile, passed, n * c.dt, floor, arrival)
+        if now != k.tile:
+            k.tile = now
+            outcome, passed = _arrive(now, passed, n * c.dt, floor, arrival)
         if outcome == RUNNING and n >= limit:
             outcome = OUT_OF_TIME
         if outcome == RUNNING:

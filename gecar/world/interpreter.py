@@ -15,7 +15,7 @@ from gecar.world.sensing import RING, delayed, glance, lag_keep, lagged, reporte
 
 # Where the program stands. `due_ms` is the schedule the program asks for; steps round it, but never add up errors.
 CONTROL = np.dtype(
-    [("row", np.int64), ("until", np.int64), ("due_step", np.int64), ("step", np.int64), ("line", np.int64)]
+    [(field, np.int64) for field in ("row", "until", "due_step", "step", "line", "tile")]
     + [(field, np.float64) for field in ("due_ms", "left_duty", "right_duty")]
 )
 
