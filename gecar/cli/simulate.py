@@ -1,0 +1,145 @@
+"""``gecar simulate``: drive a program, and draw or film the drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gecar.cli.options import (
+    CourseOption,
+    EngineOption,
+    MotorNoiseOption,
+    NoiseOption,
+    RobotOption,
+    TimeLimitOption,
+)
+from gecar.cli.voice import JsonOption, Voice
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.language.program import Program
+    from gecar.world.rollout import Drive, World
+
+PICTURES = "Pictures"
+LARGEST_SEED = 2**63 - 1
+
+ProgramArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PROGRAM",
+        show_default=False,
+        help="A program file in the paper's syntax, or the folder of a run.",
+    ),
+]
+
+
+def simulate(
+    program: ProgramArgument,
+    course: CourseOption = None,
+    robot: RobotOption = None,
+    noise: NoiseOption = None,
+    motor_noise: MotorNoiseOption = None,
+    seed: Annotated[int, typer.Option("--seed", help="Which noise.", rich_help_panel="World")] = 1,
+    time_limit: TimeLimitOption = None,
+    engine: EngineOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Where trajectory.png goes.", show_default="here",
+                     rich_help_panel=PICTURES),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Name of the picture: .png, .pdf or .svg.",
+                     show_default="trajectory.png", rich_help_panel=PICTURES),
+    ] = None,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.", rich_help_panel=PICTURES)] = False,
+    colour: Annotated[
+        str,
+        typer.Option("--colour", metavar="auto|line|speed", rich_help_panel=PICTURES,
+                     help="What the way's colour says: the line of the program, or the speed."),
+    ] = "auto",
+    animate: Annotated[
+        Path | None,
+        typer.Option("--animate", metavar="FILE", help="Film the drive: .gif, or .mp4 where ffmpeg is installed.",
+                     show_default=False, rich_help_panel=PICTURES),
+    ] = None,
+    pace: Annotated[
+        float, typer.Option("--pace", help="Seconds of driving in a second of film.", rich_help_panel=PICTURES)
+    ] = 1.0,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Drive a program in the simulation; draw or film the drive.
+
+    [bold]Examples[/]
+
+      gecar simulate runs/evolve-001
+      gecar simulate best.txt --course hairpin --animate drive.gif
+      gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
+    """
+    from gecar.cli.worlds import build_world, find_program
+    from gecar.language.program import read_program
+    from gecar.report.drive import drive_table, sentence_of, standing_of
+    from gecar.world.rollout import simulate as run
+
+    voice = Voice(as_json)
+    if not 0 <= seed <= LARGEST_SEED:
+        raise expected("--seed", seed, f"a whole number from 0 to {LARGEST_SEED}")
+    target = None if no_picture else (out or Path()) / (picture or Path("trajectory.png"))
+    _check_pictures(target, colour, animate, pace)
+    file, settings = find_program(program)
+    world = build_world(settings, course, robot, noise, motor_noise, time_limit, engine)
+    loaded = read_program(file)
+    drive = run(world, loaded.opcodes, seed, trace=True)
+    voice.say(sentence_of(drive), style="bold")
+    voice.say(standing_of(world, drive))
+    written = _draw(voice, world, loaded, drive, target, colour)
+    written |= _film(voice, world, loaded, drive, animate, pace)
+    voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": seed, **written})
+
+
+def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:
+    """Refuse before the drive what could not be drawn after it."""
+    if target is not None:
+        from gecar.plots.style import picture_kind
+        from gecar.plots.trajectory import check_colour
+
+        picture_kind(target)
+        check_colour(colour)
+    if animate is not None:
+        from gecar.plots.animation import check_film
+
+        check_film(animate, pace)
+
+
+def _draw(
+    voice: Voice, world: World, program: Program, drive: Drive, target: Path | None, colour: str
+) -> dict[str, str]:
+    """Draw the drive if a picture is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.style import save
+    from gecar.plots.trajectory import trajectory
+    from gecar.report.drive import detail_of, title_of
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    title, detail = title_of(drive, world.course), detail_of(world, drive)
+    save(trajectory(world, program, drive, title=title, detail=detail, colour=colour), target)
+    voice.say(f"Picture: {target}")
+    return {"picture": str(target)}
+
+
+def _film(
+    voice: Voice, world: World, program: Program, drive: Drive, target: Path | None, pace: float
+) -> dict[str, str]:
+    """Film the drive if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.animation import film
+    from gecar.report.drive import title_of
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    film(world, program, drive, target, title=title_of(drive, world.course), pace=pace)
+    voice.say(f"Film: {target}")
+    return {"film": str(target)}

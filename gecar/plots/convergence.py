@@ -1,0 +1,174 @@
+"""A run's convergence: the best time to GOAL, the population's mean fitness, and how varied it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from gecar.plots.style import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    PAPER,
+    PURPLE,
+    SOFT,
+    VERMILION,
+    headline,
+    look,
+    new_figure,
+)
+
+UNSOLVED = 1e4
+"""Fitness of a program that does not reach GOAL, eq. 1."""
+
+Series = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A time to compare with, drawn as a line across [s]."""
+
+    words: str
+    time_s: float
+
+
+def convergence(
+    history: Mapping[str, Series],
+    references: Sequence[Reference] = (),
+    title: str = "",
+    detail: str = "",
+) -> Figure:
+    """Draw a run's history.
+
+    Parameters
+    ----------
+    history
+        Columns of ``history.csv``, each (generations,): generation, best, mean [s], valid, distinct [shares].
+    references
+        Times to draw across the picture.
+    title, detail
+        What to write above it.
+    """
+    generation, best = history["generation"], history["best"]
+    with look():
+        figure = new_figure(8.0, 6.6)
+        headline(figure, title, detail)
+        top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
+        draw_best(top, generation, best, references)
+        _draw_mean(middle, generation, history["mean"])
+        _draw_shares(bottom, history)
+        bottom.set_xlabel("generation")
+        bottom.xaxis.set_major_locator(MaxNLocator(integer=True, steps=(1, 2, 5, 10)))
+        bottom.set_xlim(generation[0] - 0.25, max(generation[-1], generation[0] + 1) + 0.25)
+    return figure
+
+
+def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence[Reference]) -> None:
+    """Draw the best time of each generation; generations in which no program reaches GOAL are shaded."""
+    solved = best < UNSOLVED
+    times = np.where(solved, best, np.nan)
+    draw_references(axes, references)
+    axes.step(generation, times, where="post", color=BLUE, linewidth=2.2, zorder=3)
+    axes.plot(generation[solved], best[solved], "o", color=BLUE, markersize=3, zorder=3)
+    axes.set_ylabel("best time to GOAL [s]")
+    _frame(axes, best[solved], references)
+    if not solved.all():
+        _shade_unsolved(axes, generation, int(solved.argmax()) if solved.any() else len(solved))
+    if solved.any():
+        last = f"{best[-1]:.2f} s"
+        axes.annotate(
+            last,
+            (generation[-1], best[-1]),
+            (-4, 9),
+            textcoords="offset points",
+            ha="right",
+            weight="bold",
+            color=BLUE,
+        )
+
+
+def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
+    """Shade generations without a program that reaches GOAL."""
+    begin, last = generation[0] - 0.25, max(generation[-1], generation[0] + 1) + 0.25
+    end = generation[first_solved] if first_solved < len(generation) else last
+    shade: dict[str, Any] = {
+        "facecolor": "#F3F4F6",
+        "edgecolor": "#DDE1E6",
+        "hatch": "////",
+        "linewidth": 0,
+        "zorder": 0,
+    }
+    axes.axvspan(begin, end, **shade)
+    wide = (end - begin) > 0.3 * (last - begin)
+    axes.annotate(
+        "no program reaches GOAL yet",
+        (0.5 * (begin + end), 0.5),
+        xycoords=("data", "axes fraction"),
+        ha="center",
+        va="center",
+        rotation=0 if wide else 90,
+        size=8,
+        color=SOFT,
+        bbox={"facecolor": "#F3F4F6", "edgecolor": "none", "pad": 1.5},
+    )
+
+
+def draw_references(axes: Axes, references: Sequence[Reference], side: float = 1.0) -> None:
+    """Draw times to compare with across a picture of times, their words at its left (0) or right (1) end."""
+    for colour, reference in zip((VERMILION, INK, PURPLE), references, strict=False):
+        axes.axhline(reference.time_s, color=colour, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
+        axes.annotate(
+            f"{reference.words}, {reference.time_s:.2f} s",
+            (side, reference.time_s),
+            (4 - 8 * side, 5),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right" if side else "left",
+            size=8,
+            color=colour,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+        )
+
+
+def _frame(axes: Axes, times: Series, references: Sequence[Reference]) -> None:
+    """Choose limits that hold the times and the references, with room for their words."""
+    seen = [*times, *(reference.time_s for reference in references)] or [0.0, 60.0]
+    low, high = min(seen), max(seen)
+    room = max(high - low, 1.0)
+    axes.set_ylim(max(low - 0.08 * room, 0.0), high + 0.16 * room)
+
+
+def _draw_mean(axes: Axes, generation: Series, mean: Series) -> None:
+    axes.plot(generation, mean, color=ORANGE, marker=_marker(generation))
+    axes.set(
+        yscale="log",
+        ylabel="mean fitness\n(eq. 1) [s]",
+        ylim=(min(10.0, float(np.nanmin(mean))), 1.6 * UNSOLVED),
+    )
+    axes.axhline(UNSOLVED, color=SOFT, linewidth=0.8, linestyle=":")
+    axes.annotate(
+        "nobody at GOAL: $10^4$", (1.0, UNSOLVED), (-2, -10), xycoords=("axes fraction", "data"),
+        textcoords="offset points", ha="right", size=7, color=SOFT,
+    )  # fmt: skip
+
+
+def _draw_shares(axes: Axes, history: Mapping[str, Series]) -> None:
+    generation = history["generation"]
+    marker = _marker(generation)
+    axes.plot(generation, 100 * history["valid"], color=GREEN, marker=marker, label="valid")
+    axes.plot(generation, 100 * history["distinct"], color=PURPLE, marker=marker, label="distinct programs")
+    axes.set(ylabel="population [%]", ylim=(-4, 108))
+    axes.legend(ncols=2, loc="upper right", bbox_to_anchor=(1.0, 1.2), borderaxespad=0.0)
+
+
+def _marker(generation: Series) -> str | None:
+    """Return a marker where there are too few points for a line to show."""
+    return "o" if len(generation) < 2 else None

@@ -1,0 +1,71 @@
+"""A drive in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gecar.world.course import Course
+from gecar.world.rollout import Drive, Outcome, World
+
+PAPER_BEST_S = 16.74
+"""Time to GOAL of the paper's best program on its course (Tables 5 and 6) [s]."""
+
+
+def title_of(drive: Drive, course: Course) -> str:
+    """Say in a few words what came of a drive."""
+    where = course.title or course.name
+    if drive.outcome == Outcome.GOAL:
+        return f"{where}: GOAL in {drive.time_s:.2f} s"
+    return f"{where}: {drive.outcome.sentence} after {drive.time_s:.2f} s"
+
+
+def sentence_of(drive: Drive) -> str:
+    """Say in one sentence what came of a drive."""
+    if drive.outcome == Outcome.GOAL:
+        return f"The robot reached GOAL through all checkpoints in {drive.time_s:.2f} s."
+    return f"The robot {drive.outcome.sentence} after {drive.time_s:.2f} s."
+
+
+def standing_of(world: World, drive: Drive) -> str:
+    """Say how far a drive came, and how its time stands beside the lower bound and the paper's best."""
+    bound = world.course.lower_bound_s(world.robot)
+    words = f"{drive.checkpoints} of {len(world.course.sequence) - 1} checkpoints; "
+    words += f"lower bound {bound:.2f} s, which no program can beat"
+    if drive.outcome == Outcome.GOAL:
+        words += f" ({100 * (drive.time_s / bound - 1):.0f} % above it)"
+    if world.course.name == "paper":
+        words += f"; the paper's best {PAPER_BEST_S} s"
+    return words + "."
+
+
+def detail_of(world: World, drive: Drive) -> str:
+    """Say what a drive is measured by: checkpoints, lower bound, and what it was simulated with."""
+    course = world.course
+    parts = [
+        f"{drive.checkpoints} of {len(course.sequence) - 1} checkpoints",
+        f"no program is faster than {course.lower_bound_s(world.robot):.2f} s",
+        f"robot {world.robot.name}",
+        f"step {1000 * world.step_s:g} ms",
+    ]
+    noise = world.noise
+    if noise.sensor_pct or noise.motor_share:
+        parts.append(f"noise: sensor {noise.sensor_pct:g} %, motors {100 * noise.motor_share:g} %")
+    return " · ".join(parts)
+
+
+def drive_table(world: World, drive: Drive) -> dict[str, Any]:
+    """Return a drive's figures, ready for JSON."""
+    return {
+        "outcome": drive.outcome.name.lower(),
+        "reached_goal": drive.outcome == Outcome.GOAL,
+        "time_s": round(drive.time_s, 6),
+        "checkpoints": drive.checkpoints,
+        "checkpoints_of": len(world.course.sequence) - 1,
+        "arrival_s": [None if np.isnan(t) else round(float(t), 6) for t in drive.arrival_s],
+        "lower_bound_s": round(world.course.lower_bound_s(world.robot), 4),
+        "course": world.course.name,
+        "robot": world.robot.name,
+        "engine": "pymunk" if world.uses_pymunk else "inline",
+    }

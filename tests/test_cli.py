@@ -1,0 +1,93 @@
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from command import ROOT, start
+
+from gecar.cli.application import SEATS
+
+
+def test_help_names_every_command_and_is_fast():
+    code = (
+        "import sys, time; begin = time.perf_counter(); sys.argv = ['gecar', '--help']\n"
+        "from gecar.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(time.perf_counter() - begin, [m for m in ('numba', 'numpy', 'matplotlib') if m in sys.modules])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    ).stdout
+    taken, imported = said.splitlines()[-1].split(" ", 1)
+    assert imported == "[]"
+    assert float(taken) < 0.6
+    assert all(seat.name in said for seat in SEATS if seat.exists)
+
+
+@pytest.mark.parametrize("seat", [seat for seat in SEATS if seat.exists], ids=lambda seat: seat.name)
+def test_every_command_explains_itself(gecar, seat):
+    ended = gecar(seat.name, "--help")
+    assert ended.code == 0
+    assert "Usage" in ended.out
+    assert len(ended.out.splitlines()) > 5
+
+
+@pytest.mark.parametrize("seat", [seat for seat in SEATS if seat.exists], ids=lambda seat: seat.name)
+def test_help_of_each_command_needs_no_compiler(seat):
+    code = (
+        "import sys; from gecar.cli.application import SEATS\n"
+        f"next(s for s in SEATS if s.name == {seat.name!r}).load()\n"
+        "assert not {'numba', 'matplotlib', 'scipy'} & set(sys.modules), sorted(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
+def test_version(gecar):
+    assert gecar("--version").out.startswith("gecar ")
+
+
+def test_a_mistyped_command_or_option_gets_a_suggestion(gecar):
+    ended = gecar("gramar")
+    assert ended.code == 2
+    assert "grammar" in ended.err
+    ended = gecar("grammar", "map", "paper", "--sed", "1")
+    assert ended.code == 2
+    assert "--seed" in ended.err
+
+
+def test_a_fault_of_gecars_own_is_one_line_and_asks_for_a_report(gecar, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("that should not happen")
+
+    monkeypatch.setattr("gecar.language.grammar.load_grammar", broken)
+    ended = gecar("grammar", "check", "paper")
+    assert ended.code == 1
+    assert ended.err.startswith("internal error: RuntimeError: that should not happen")
+    assert "GECAR_DEBUG" in ended.err
+    monkeypatch.setenv("GECAR_DEBUG", "1")
+    with pytest.raises(RuntimeError):
+        gecar("grammar", "check", "paper")
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    reader = subprocess.Popen([sys.executable, "-c", "pass"], stdin=subprocess.PIPE)
+    process = start("grammar", "map", "paper", "--count", "2000", stdout=reader.stdin)
+    reader.stdin.close()
+    _, said = process.communicate(timeout=60)
+    reader.wait()
+    assert "Traceback" not in said
+    assert "rror" not in said
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_ctrl_c_ends_with_one_word():
+    process = start("grammar", "map", "paper", "--count", "100000")
+    try:
+        process.wait(timeout=1.0)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said == "stopped\n"
