@@ -81,7 +81,7 @@ def visibility(
 
 def _run_energy(there: Array, absent: Array, conditions: Conditions, window_rows: int) -> Array:
     energy = np.zeros_like(there)
-    frames = camera_rows(len(there), conditions.camera_hz) > 0.0
+    frames = camera_rows(np.arange(len(there), dtype=np.float64) * 0.01, conditions.camera_hz) > 0.0
     for first in range(0, len(there) - window_rows, window_rows):
         rows = np.arange(first, first + window_rows)
         for k, name in enumerate(CHANNELS):

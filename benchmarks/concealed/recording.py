@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from scipy.signal import lfilter
 
 from benchmarks.concealed.colour_sensor import FIELD
 from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.truth import ROW_TICKS, Array, History
+
+Ticks = npt.NDArray[np.intp]
 
 # Standard deviations at noise level 1: pose as the practice cases state it, the others as estimated from them
 # (reflection: 888, 274, 37 and 2 readings of 100, 99, 98 and 97 on bare floor); gyro: LEGO's resolution, halved.
@@ -61,7 +64,14 @@ class Conditions:
         return self.camera_offsets_s[run] if self.camera_offsets_s else 0.0
 
 
-def channels(history: History, concealed: Concealed, camera_offset_s: float = 0.0) -> dict[str, Array]:
+def even_ticks(history: History) -> Ticks:
+    """Give the ticks at which a row is written: every 10 ms."""
+    return np.arange(0, len(history.time_s), ROW_TICKS)
+
+
+def channels(
+    history: History, concealed: Concealed, camera_offset_s: float = 0.0, ticks: Ticks | None = None
+) -> dict[str, Array]:
     """Give what every sensor would report without noise, rounding or gaps, at the recording's rows.
 
     Parameters
@@ -72,15 +82,17 @@ def channels(history: History, concealed: Concealed, camera_offset_s: float = 0.
         For what happens between the robot and the pose's column.
     camera_offset_s
         Added to the pose's delay [s].
+    ticks
+        When rows are written; every 10 ms if not given.
 
     Returns
     -------
     dict[str, Array]
         One array per name in ``CHANNELS`` (rows,).
     """
-    rows = slice(None, None, ROW_TICKS)
+    rows = even_ticks(history) if ticks is None else ticks
     angles = np.degrees(history.angles[rows])
-    x, y, heading = _seen_pose(history, concealed, concealed.pose_delay + camera_offset_s)
+    x, y, heading = _seen_pose(history, concealed, rows, concealed.pose_delay + camera_offset_s)
     columns = (
         angles[:, 0],
         angles[:, 1],
@@ -122,14 +134,19 @@ def noise(name: str, rows: int, conditions: Conditions, rng: np.random.Generator
     return total
 
 
-def camera_rows(rows: int, camera_hz: float) -> Array:
-    """Say in which rows a pose arrived (rows,), 0 or 1."""
-    frames = np.floor(np.arange(rows) * 0.01 * camera_hz + 1e-9)
+def camera_rows(times_s: Array, camera_hz: float) -> Array:
+    """Say in which rows, written at these times [s], a pose arrived (rows,), 0 or 1."""
+    frames = np.floor(times_s * camera_hz + 1e-9)
     return np.concatenate([[1.0], (np.diff(frames) > 0.0).astype(np.float64)])
 
 
 def write_recording(
-    path: Path, history: History, clean: dict[str, Array], conditions: Conditions, rng: np.random.Generator
+    path: Path,
+    history: History,
+    clean: dict[str, Array],
+    conditions: Conditions,
+    rng: np.random.Generator,
+    ticks: Ticks | None = None,
 ) -> None:
     """Write the CSV file and the TOML file beside it.
 
@@ -145,11 +162,14 @@ def write_recording(
         Noise, camera rate, columns.
     rng
         Source of randomness.
+    ticks
+        The same as for ``clean``.
     """
-    commands, readings = history.commands[::ROW_TICKS], history.readings[::ROW_TICKS]
-    rows = len(commands)
-    frames = camera_rows(rows, conditions.camera_hz)
-    texts = {"t_s": [f"{0.01 * row:.4f}" for row in range(rows)]}
+    ticks = even_ticks(history) if ticks is None else ticks
+    times, commands, readings = history.time_s[ticks], history.commands[ticks], history.readings[ticks]
+    rows = len(times)
+    frames = camera_rows(times, conditions.camera_hz)
+    texts = {"t_s": [f"{time:.4f}" for time in times]}
     for side, name in enumerate(("left_duty_pct", "right_duty_pct")):
         texts[name] = [str(round(value)) for value in commands[:, side]]
     for name in CHANNELS:
@@ -170,9 +190,11 @@ def write_recording(
     path.with_suffix(".toml").write_text(beside, encoding="utf-8", newline="\n")
 
 
-def _seen_pose(history: History, concealed: Concealed, late_s: float) -> tuple[Array, Array, Array]:
+def _seen_pose(
+    history: History, concealed: Concealed, ticks: Ticks, late_s: float
+) -> tuple[Array, Array, Array]:
     """Pose as the camera has it: late, through its lens, from its slowly turning mount."""
-    times = history.time_s[::ROW_TICKS]
+    times = history.time_s[ticks]
     pose = np.stack([np.interp(times - late_s, history.time_s, column) for column in history.pose.T])
     away = pose[:2] - np.array(FIELD)[:, None] / 2.0
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))

@@ -74,6 +74,7 @@ class Truth:
         seconds: float,
         reading_noise: Array | None = None,
         turn_ticks: int = ROW_TICKS,
+        ended: Callable[[float, float], bool] | None = None,
     ) -> History:
         """Drive from rest.
 
@@ -89,6 +90,8 @@ class Truth:
             Noise on the sensor's reading per tick (n,) [%], before rounding.
         turn_ticks
             Ticks between two turns of the controller.
+        ended
+            From the axle's place [m] to whether the run is over; asked whenever the controller is.
 
         Returns
         -------
@@ -109,7 +112,7 @@ class Truth:
             log.readings[tick] = min(max(round(log.light[tick] + noise[tick]), 0), 100)
             if tick % turn_ticks == 0:
                 command = controller(time_s, int(log.readings[tick]))
-                if command is None:
+                if command is None or (ended is not None and ended(log.pose[tick, 0], log.pose[tick, 1])):
                     return _finished(log.until(tick + 1))
             log.commands[tick] = command
             log.terminal_v[tick] = self._push(train, state, command, time_s)

@@ -1,0 +1,170 @@
+"""The command line: ``python -m benchmarks.concealed draw | plan | run | score | drive | practice``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+from benchmarks.concealed.runner import DISCOVER, run_all
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Parse the command line and run one command.
+
+    Parameters
+    ----------
+    arguments
+        Words after the program's name; those of the process if not given.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    chosen = _parser().parse_args(arguments)
+    try:
+        code: int = chosen.command(chosen)
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.concealed", description=__doc__)
+    commands = parser.add_subparsers(required=True)
+
+    draw = commands.add_parser("draw", help="draw and seal one case")
+    draw.add_argument("--seed", type=int, required=True)
+    draw.add_argument("--kind", choices=("none", "single", "double", "outside"), required=True)
+    draw.add_argument("--effect", action="append", default=[], help="identifier; twice for --kind double")
+    draw.add_argument("--name", default="case", help="of the case's folder")
+    draw.set_defaults(command=_draw)
+
+    plan = commands.add_parser("plan", help="draw and seal a whole examination; resumes")
+    plan.add_argument("--seed", type=int, required=True)
+    plan.add_argument("--none", type=int, default=100, help="cases that conceal nothing")
+    plan.add_argument("--each", type=int, default=5, help="cases of every effect")
+    plan.add_argument("--double", type=int, default=40, help="cases that conceal two effects")
+    plan.add_argument("--outside-each", type=int, default=3, help="cases of every kind outside the catalogue")
+    plan.set_defaults(command=_plan)
+
+    run = commands.add_parser("run", help="run a tool on every open case; resumes")
+    run.add_argument("--verdicts", type=Path, required=True)
+    run.add_argument("--tool", default=DISCOVER, help="command with {case}, {out} and, if wanted, {holdout}")
+    run.add_argument("--timeout", type=float, default=900.0, help="seconds a case may take")
+    run.set_defaults(command=_run)
+
+    score = commands.add_parser("score", help="open the labels and score a folder of verdicts")
+    score.add_argument("--verdicts", type=Path, required=True)
+    score.add_argument("--title", default="Concealed cases")
+    score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
+    score.set_defaults(command=_score)
+
+    for command in (draw, plan, run, score):
+        command.add_argument(
+            "--out", type=Path, default=Path("runs/concealed"), help="holds cases/ and sealed/"
+        )
+        command.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+
+    drive = commands.add_parser("drive", help="drive a program round the course on a concealed robot")
+    drive.add_argument("program", type=Path, help="JSON: opcode rows")
+    drive.add_argument("--recording", type=Path, help="CSV file to write")
+    drive.add_argument(
+        "--robot", default="paper_like", help="nominal, paper_like, or JSON of concealed numbers"
+    )
+    drive.add_argument("--seed", type=int, default=0)
+    drive.set_defaults(command=_drive)
+
+    practice = commands.add_parser("practice", help="replay the practice cases with their answers (minutes)")
+    practice.add_argument("folder", type=Path)
+    practice.set_defaults(command=_practice)
+    return parser
+
+
+# What needs MuJoCo, or matplotlib, is imported by the command that needs it: `run` and `--help` do without.
+
+
+def _draw(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.cases import draw_case, seal  # noqa: PLC0415
+
+    _known(chosen.kind, chosen.effect)
+    draw_case(chosen.name, chosen.kind, tuple(chosen.effect), (chosen.seed,), chosen.out)
+    print(seal(chosen.out))
+    return 0
+
+
+def _plan(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.plan import Counts, draw_all, plan  # noqa: PLC0415
+
+    counts = Counts(chosen.none, chosen.each, chosen.double, chosen.outside_each)
+    print(draw_all(plan(chosen.seed, counts), chosen.out, chosen.workers))
+    return 0
+
+
+def _run(chosen: argparse.Namespace) -> int:
+    if not (chosen.out / "manifest.sha256").exists():
+        print(
+            f"{chosen.out}: no manifest; seal the cases with `plan` before any tool sees them",
+            file=sys.stderr,
+        )
+        return 2
+    failed = run_all(chosen.out / "cases", chosen.verdicts, chosen.tool, chosen.workers, chosen.timeout)
+    print("\n".join(failed))
+    return 1 if failed else 0
+
+
+def _score(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.score import manifest_hash, score  # noqa: PLC0415
+    from benchmarks.concealed.tables import draw, report  # noqa: PLC0415
+
+    judged = score(chosen.out, chosen.verdicts, chosen.workers)
+    text = report(judged, chosen.title, manifest_hash(chosen.out))
+    if chosen.report is None:
+        print(text)
+        return 0
+    chosen.report.parent.mkdir(parents=True, exist_ok=True)
+    chosen.report.write_text(text, encoding="utf-8", newline="\n")
+    draw(judged, chosen.report.with_suffix(".png"))
+    return 0
+
+
+def _drive(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.program import PAPER_LIKE, drive  # noqa: PLC0415
+    from benchmarks.concealed.robot import NEUTRAL, Concealed  # noqa: PLC0415
+
+    known = {"nominal": NEUTRAL, "paper_like": PAPER_LIKE}
+    robot = known[chosen.robot] if chosen.robot in known else Concealed(**json.loads(chosen.robot))
+    rows = json.loads(chosen.program.read_text(encoding="utf-8"))
+    result = drive(rows, robot, seed=chosen.seed, path=chosen.recording)
+    arrivals = [None if arrival != arrival else round(float(arrival), 3) for arrival in result.arrivals_s]  # noqa: PLR0124
+    print(json.dumps({"outcome": result.outcome, "time_s": round(result.time_s, 3), "arrivals_s": arrivals}))
+    return 0
+
+
+def _practice(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.practice import table  # noqa: PLC0415
+
+    print(table(chosen.folder))
+    return 0
+
+
+def _known(kind: str, effects: list[str]) -> None:
+    """Refuse what cannot be drawn, in one line."""
+    from benchmarks.concealed.effects import EFFECTS  # noqa: PLC0415
+    from benchmarks.concealed.outside import OUTSIDE  # noqa: PLC0415
+
+    choices = list(OUTSIDE if kind == "outside" else EFFECTS)
+    count = {"none": 0, "single": 1, "double": 2, "outside": 1}[kind]
+    unknown = [effect for effect in effects if effect not in choices]
+    if len(set(effects)) != count or len(effects) != count or unknown:
+        found = ", ".join(effects) or "none"
+        message = f"--effect: found {found}, expected {count} different of: {', '.join(choices)}"
+        raise ValueError(message)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
