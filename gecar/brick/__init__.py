@@ -1,0 +1,1 @@
+"""Programs for the brick: what a person copies to a LEGO EV3 and starts there."""

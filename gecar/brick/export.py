@@ -1,0 +1,215 @@
+"""Write a program as the files that a person copies to a LEGO EV3."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from gecar.brick import main_py
+from gecar.brick.words import READERS, function_text
+from gecar.errors import expected
+from gecar.language.program import Program
+from gecar.language.statements import If, Sensor, Statement
+from gecar.world.robot import Robot
+
+TARGETS = ("pybricks2", "pybricks4")
+TIME_LIMIT_S = 60  # the paper's
+MOST_STATEMENTS = 1000  # MicroPython's jumps reach 32 kB: an if of more statements would not compile
+
+_CONSTANTS = {
+    Sensor.CENTRE: "COLOUR_SENSOR",
+    Sensor.LEFT: "LEFT_COLOUR_SENSOR",
+    Sensor.RIGHT: "RIGHT_COLOUR_SENSOR",
+}
+
+
+@dataclass(frozen=True)
+class Ports:
+    """Where motors and sensors are plugged in.
+
+    Attributes
+    ----------
+    left_motor, right_motor
+        ``A`` to ``D``; a minus before the letter for a motor mounted the other way round.
+    sensor, left_sensor, right_sensor
+        ``1`` to ``4``; only those that the program reads matter.
+    """
+
+    left_motor: str = "B"
+    right_motor: str = "C"
+    sensor: str = "3"
+    left_sensor: str = "2"
+    right_sensor: str = "4"
+
+    def __post_init__(self) -> None:
+        for name in ("left_motor", "right_motor"):
+            if not re.fullmatch("-?[A-D]", getattr(self, name)):
+                raise expected(
+                    f"port of {name}", repr(getattr(self, name)), "A, B, C or D, or with a minus before it"
+                )
+        for name in ("sensor", "left_sensor", "right_sensor"):
+            if getattr(self, name) not in ("1", "2", "3", "4"):
+                raise expected(f"port of {name}", repr(getattr(self, name)), "1, 2, 3 or 4")
+
+    def of(self, sensor: Sensor) -> str:
+        """Return a sensor's port."""
+        return {Sensor.CENTRE: self.sensor, Sensor.LEFT: self.left_sensor, Sensor.RIGHT: self.right_sensor}[
+            sensor
+        ]
+
+
+def export_program(program: Program, robot: Robot, target: str, ports: Ports | None = None) -> dict[str, str]:
+    """Write a program as files for the brick.
+
+    Parameters
+    ----------
+    program
+        What to drive.
+    robot
+        For its wheels, its track, its cap on duty and the sensor levels its thresholds are meant for.
+    target
+        ``"pybricks2"``: LEGO's EV3 MicroPython 2.0, started from its menu or from Visual Studio Code.
+        ``"pybricks4"``: Pybricks 4, started from Pybricks Code.
+    ports
+        Where motors and sensors are plugged in.
+
+    Returns
+    -------
+    dict
+        Text by file name, with line feeds only. ``main.py`` is the program.
+
+    Raises
+    ------
+    InputError
+        If there is no such target, or the program is empty or too long for a brick.
+    """
+    if target not in TARGETS:
+        raise expected("target", repr(target), " or ".join(TARGETS))
+    statements = sum(1 for _ in _all(program.statements))
+    if not 1 <= statements <= MOST_STATEMENTS:
+        raise expected("program", f"{statements} statements", f"1 to {MOST_STATEMENTS}, to fit on a brick")
+    files = {"main.py": _main(program, robot, target, ports or Ports())}
+    return files | _vs_code() if target == "pybricks2" else files
+
+
+def _all(statements: Sequence[Statement]) -> Iterator[Statement]:
+    for statement in statements:
+        yield statement
+        if isinstance(statement, If):
+            yield from _all(statement.then)
+            yield from _all(statement.otherwise)
+
+
+def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
+    sensors = [sensor for sensor in Sensor if sensor in program.sensors] or [Sensor.CENTRE]
+    second = target == "pybricks2"
+    text = (
+        main_py.TOP
+        + function_text(program.statements)
+        + main_py.DRIVING
+        + (main_py.KEEP_IN_FILE if second else main_py.KEEP_IN_STORAGE)
+        + main_py.RUN
+    )
+    words = (
+        _robot_words(robot, ports)
+        | _sensor_words(sensors, ports)
+        | _log_words(second, Sensor.CENTRE in sensors)
+    )
+    for name, word in words.items():
+        text = text.replace(f"[[{name}]]", word)
+    return main_py.SHEBANG + text if second else text
+
+
+def _robot_words(robot: Robot, ports: Ports) -> dict[str, str]:
+    """Return what the robot and its build say."""
+    command = "run(10 * capped({}))" if robot.drive.mode == "speed" else "dc(capped({}))"
+    forward = {
+        name: "COUNTERCLOCKWISE" if getattr(ports, name)[0] == "-" else "CLOCKWISE"
+        for name in ("left_motor", "right_motor")
+    }
+    return {
+        "LEFT_MOTOR": ports.left_motor[-1],
+        "RIGHT_MOTOR": ports.right_motor[-1],
+        "LEFT_FORWARD": forward["left_motor"],
+        "RIGHT_FORWARD": forward["right_motor"],
+        "WHEEL_DIAMETER": f"{2000 * robot.body.wheel_radius:.6g}",
+        "TRACK_WIDTH": f"{1000 * robot.body.track_width:.6g}",
+        "DUTY_CAP": f"{100 * robot.drive.duty_cap:.6g}",
+        "WHITE": f"{robot.colour_sensor.white:.6g}",
+        "BLACK": f"{robot.colour_sensor.black:.6g}",
+        "LIMIT": str(TIME_LIMIT_S),
+        "COMMAND": command.format("left"),
+        "COMMAND_RIGHT": command.format("right"),
+    }
+
+
+def _sensor_words(sensors: Sequence[Sensor], ports: Ports) -> dict[str, str]:
+    """Return what the sensors that a program reads need."""
+    functions = [f"def {READERS[sensor]}():\n    return reading({k})\n\n" for k, sensor in enumerate(sensors)]
+    light = sensors.index(Sensor.CENTRE) if Sensor.CENTRE in sensors else None
+    return {
+        "SENSOR_PORTS": "\n".join(f"{_CONSTANTS[sensor]} = Port.S{ports.of(sensor)}" for sensor in sensors),
+        "SENSORS": "[" + ", ".join(f"ColorSensor({_CONSTANTS[sensor]})" for sensor in sensors) + "]",
+        "SENSOR_FUNCTIONS": "\n".join(functions),
+        "LIGHT": "0" if light is None else f"reading({light})",
+    }
+
+
+def _log_words(second: bool, with_light: bool) -> dict[str, str]:
+    """Return how the log is written: names as `gecar.reality.columns` has them."""
+    light = ['"reflection_pct"'] if with_light else []
+    columns = [
+        '"t_s"',
+        '"left_duty_pct"',
+        '"right_duty_pct"',
+        *light,
+        '"left_angle_deg"',
+        '"right_angle_deg"',
+        '"battery_v"',
+    ]
+    values = ", ".join(
+        ["time", "left", "right", *(["light"] if light else []), "left_angle", "right_angle", "volts"]
+    )
+    words = {"COLUMNS": ", ".join(columns) + ","}
+    remark = '"# white, black: " + str(calibration)'
+    if second:
+        return words | {
+            "TITLE": "Drives a LEGO EV3 with EV3 MicroPython 2.0 (Pybricks).",
+            "HOW_TO_START": "Copy this folder to the brick (Visual Studio Code: F5) and start main.py.",
+            "HOW_TO_GET_THE_LOG": "The run is in gecar_log_(date).csv on the brick: gecar import reads it.",
+            "TOOLS": "DataLog, StopWatch, wait",
+            "BEFORE_SAVING": '    say("Saving the log,", "wait ...")',
+            "OPEN_LOG": f'    log = DataLog(*COLUMNS, name="gecar_log")\n    log.log({remark})',
+            "WRITE_ROW": f"log.log({values})",
+        }
+    return words | {
+        "TITLE": "Drives a LEGO EV3 with Pybricks 4.",
+        "HOW_TO_START": "Open it in Pybricks Code and start it there, with the brick connected.",
+        "HOW_TO_GET_THE_LOG": "The run is printed: copy the terminal's text into a file, which gecar import reads.",
+        "TOOLS": "StopWatch, wait",
+        "BEFORE_SAVING": '    say("Connect again,", "CENTER prints", "the log.")\n    wait_for(Button.CENTER)',
+        "OPEN_LOG": f'    print({remark})\n    print(",".join(COLUMNS))',
+        "WRITE_ROW": f'print({values}, sep=",")',
+    }
+
+
+def _vs_code() -> dict[str, str]:
+    """Return what LEGO's extension for Visual Studio Code writes into a project: F5 runs it, line feeds stay."""
+    launch = {
+        "version": "0.2.0",
+        "configurations": [
+            {
+                "name": "Download and Run",
+                "type": "ev3devBrowser",
+                "request": "launch",
+                "program": "/home/robot/${workspaceRootFolderName}/main.py",
+            }
+        ],
+    }
+    settings = {"files.eol": "\n"}
+    return {
+        ".vscode/launch.json": json.dumps(launch, indent=4) + "\n",
+        ".vscode/settings.json": json.dumps(settings, indent=4) + "\n",
+    }

@@ -1,0 +1,7 @@
+import json
+
+import bridge
+
+
+def call(name, *values):
+    return json.loads(bridge.call(json.dumps((name,) + values)))
