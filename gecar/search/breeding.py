@@ -1,0 +1,161 @@
+"""Breeding: the settings' operators, put together in the order the paper lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.language.mapping import Mapper
+from gecar.search.crossover import OnePoint, Subtree
+from gecar.search.fitness import Scores, merit
+from gecar.search.initialisation import initialise
+from gecar.search.mutation import Creep, Flip, Renew
+from gecar.search.phenotypes import Phenotype, Phenotypes
+from gecar.search.randomness import Streams, spawn
+from gecar.search.selection import deviations, lexicase, segment_times, tournament
+from gecar.search.settings import Settings
+
+Bytes = npt.NDArray[np.uint8]
+Int32s = npt.NDArray[np.int32]
+Operator = Callable[[Bytes, Mapper, Streams], Bytes]
+"""Genomes (children, codons), what they derive, and a stream for each; the genomes may be changed in place."""
+
+
+@dataclass(frozen=True)
+class Bred:
+    """Individuals that wait for their scores.
+
+    Attributes
+    ----------
+    genomes
+        Elites first (population, codons).
+    phenotypes
+        Their programs; None where a genome maps to none.
+    parents
+        Indices in the population before (population, 2): whose genome it was, and whom it was paired with; an
+        elite's are twice itself, the first population's are -1.
+    """
+
+    genomes: Bytes
+    phenotypes: list[Phenotype | None]
+    parents: Int32s
+
+
+class Breeder:
+    """Breeds populations; what it breeds depends on nothing but its arguments.
+
+    Parameters
+    ----------
+    settings
+        Which operators.
+    mapper
+        What genomes derive.
+    seed
+        The run's.
+    """
+
+    def __init__(self, settings: Settings, mapper: Mapper, seed: int) -> None:
+        self.settings, self.mapper, self.seed = settings, mapper, seed
+        self._phenotypes = Phenotypes(mapper)
+        self._operators = _operators(settings)
+
+    def first(self, known: Callable[[bytes], bool]) -> Bred:
+        """Return the first population."""
+        settings = self.settings
+
+        def draw(attempt: int) -> tuple[Bytes, Int32s]:
+            streams = spawn(self.seed, 0, attempt, settings.population)
+            return initialise(settings, self.mapper, streams), np.full((settings.population, 2), -1, np.int32)
+
+        return self._without_duplicates(draw, 0, known)
+
+    def next(self, genomes: Bytes, scores: Scores, generation: int, known: Callable[[bytes], bool]) -> Bred:
+        """Return the population bred from one that has its scores.
+
+        Parameters
+        ----------
+        genomes, scores
+            The population before.
+        generation
+            The number of the new one.
+        known
+            Whether a program, by its digest, was simulated before.
+        """
+        n_elites = self.settings.elites
+        merits = merit(scores, self.settings.checkpoint_credit)
+        elites = np.argsort(merits, kind="stable")[:n_elites].astype(np.int32)
+
+        def draw(attempt: int) -> tuple[Bytes, Int32s]:
+            n = self.settings.population - n_elites
+            streams = spawn(self.seed, generation, attempt, n + n % 2)
+            chosen = self._select(merits, scores, streams)
+            children = genomes[chosen]
+            for operator in self._operators:
+                children = operator(children, self.mapper, streams)
+            pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
+            return (
+                np.concatenate([genomes[elites], children[:n]]),
+                np.concatenate([np.column_stack([elites, elites]), pairs[:n]]),
+            )
+
+        return self._without_duplicates(draw, n_elites, known)
+
+    def _select(self, merits: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
+        if self.settings.selection == "tournament":
+            return tournament(merits, self.settings.tournament, streams)
+        cases = segment_times(scores["arrival_s"])
+        return lexicase(cases, deviations(cases), streams)
+
+    def _without_duplicates(
+        self, draw: Callable[[int], tuple[Bytes, Int32s]], n_elites: int, known: Callable[[bytes], bool]
+    ) -> Bred:
+        """Draw individuals, and draw those again that are duplicates, as often as the settings say."""
+        self._phenotypes.turn()
+        genomes, parents = draw(0)
+        phenotypes = self._phenotypes.read(genomes)
+        attempts = 0 if self.settings.duplicates == "kept" else self.settings.attempts
+        simulated = known if self.settings.duplicates == "run" else _never
+        for attempt in range(1, attempts + 1):
+            again = _duplicates(phenotypes, n_elites, simulated)
+            if not again:
+                break
+            others, their_parents = draw(attempt)
+            genomes[again], parents[again] = others[again], their_parents[again]
+            for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
+                phenotypes[i] = phenotype
+        return Bred(genomes, phenotypes, parents)
+
+
+def _operators(settings: Settings) -> list[Operator]:
+    """Return crossover and mutation as the settings have them."""
+    if settings.mutation == "renew":
+        return [Renew(settings)]
+    crossover: dict[str, Operator] = {
+        "one_point": OnePoint(settings.crossover_rate),
+        "one_point_used": OnePoint(settings.crossover_rate, within_used=True),
+        "subtree": Subtree(settings.crossover_rate),
+    }
+    flip = Flip(settings.mutation_rate, within_used=settings.mutation == "used_codon")
+    creep = [Creep(settings.creep_rate)] if settings.creep_rate else []
+    return [crossover[settings.crossover], flip, *creep]
+
+
+def _duplicates(
+    phenotypes: list[Phenotype | None], n_elites: int, simulated: Callable[[bytes], bool]
+) -> list[int]:
+    """Return the individuals, elites apart, that are no program or one seen before."""
+    seen: set[bytes] = set()
+    found = []
+    for i, phenotype in enumerate(phenotypes):
+        if i >= n_elites and (phenotype is None or phenotype.digest in seen or simulated(phenotype.digest)):
+            found.append(i)
+        if phenotype is not None:
+            seen.add(phenotype.digest)
+    return found
+
+
+def _never(digest: bytes) -> bool:  # noqa: ARG001
+    return False

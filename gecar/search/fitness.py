@@ -1,0 +1,115 @@
+"""Scores: the fitness of eq. 1, what selection may know beside it, and what a drive was like."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.errors import expected
+
+UNSOLVED = 1e4
+"""Fitness of what does not reach GOAL through all checkpoints in time, eq. 1."""
+INVALID = -1
+"""Outcome of a genome that maps to no program; the others are `gecar.world.rollout.Outcome`."""
+
+Scores = npt.NDArray[np.void]
+Floats = npt.NDArray[np.float64]
+
+
+def score_type(n_arrivals: int = 0) -> np.dtype[np.void]:
+    """Return the dtype of scores.
+
+    Parameters
+    ----------
+    n_arrivals
+        How many tiles' arrival times to keep; 0 unless selection wants them.
+
+    Returns
+    -------
+    numpy.dtype
+        ``fitness_s``: eq. 1 [s]. ``share``: how far along the course it came, 0..1, for selection only.
+        ``outcome``, ``checkpoints``, ``time_s``, ``steps``: of the drive. ``arrival_s``: when each tile of the
+        course's sequence was reached [s], nan where it was not.
+    """
+    return np.dtype(
+        [
+            ("fitness_s", "<f8"),
+            ("share", "<f8"),
+            ("outcome", "<i1"),
+            ("checkpoints", "<i4"),
+            ("time_s", "<f8"),
+            ("steps", "<i8"),
+            ("arrival_s", "<f8", (n_arrivals,)),
+        ]
+    )
+
+
+def invalid_scores(n: int, n_arrivals: int = 0) -> Scores:
+    """Return the scores of n genomes that map to no program."""
+    scores = np.zeros(n, score_type(n_arrivals))
+    scores["fitness_s"] = UNSOLVED
+    scores["share"] = -1.0
+    scores["outcome"] = INVALID
+    scores["arrival_s"] = np.nan
+    return scores
+
+
+def as_scores(results: Any, n: int, n_arrivals: int) -> Scores:
+    """Check what an evaluation returned.
+
+    Parameters
+    ----------
+    results
+        Scores (n,), or only their fitness [s] as numbers.
+    n
+        How many were asked for.
+    n_arrivals
+        As in `score_type`.
+
+    Raises
+    ------
+    InputError
+        If there are more or fewer, or one has no fitness.
+    """
+    wanted = score_type(n_arrivals)
+    given = np.asarray(results)
+    if given.dtype != wanted:
+        given = _from_fitness(given, n_arrivals)
+    if given.shape != (n,):
+        raise expected(
+            "tell", f"scores of shape {given.shape}", f"one score for each of the {n} programs asked for"
+        )
+    if np.isnan(given["fitness_s"]).any():
+        raise expected("tell", "a fitness that is not a number", "seconds, or 10000 for a program that fails")
+    return given
+
+
+def _from_fitness(given: npt.NDArray[Any], n_arrivals: int) -> Scores:
+    """Make scores of fitness alone; the course was then passed or not."""
+    if given.dtype.kind not in "iuf" or n_arrivals:
+        raise expected(
+            "tell", f"results of dtype {given.dtype}", f"numbers, or scores of dtype {score_type(n_arrivals)}"
+        )
+    scores = np.zeros(given.shape, score_type())
+    scores["fitness_s"] = given
+    scores["share"] = given < UNSOLVED
+    return scores
+
+
+def merit(scores: Scores, checkpoint_credit: bool) -> Floats:
+    """Return what tournaments and elites go by; lower is better.
+
+    Parameters
+    ----------
+    scores
+        The population's.
+    checkpoint_credit
+        Whether the cliff of eq. 1 slopes: unsolved individuals then lie between 10^4 and 10^4 + 2, those that
+        came farther below the others. Fitness as reported stays eq. 1.
+    """
+    fitness: Floats = scores["fitness_s"]
+    if not checkpoint_credit:
+        return fitness
+    return np.where(fitness < UNSOLVED, fitness, UNSOLVED + 1.0 - scores["share"])

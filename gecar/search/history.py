@@ -1,0 +1,133 @@
+"""The record of a run, generation by generation, and how fast it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from gecar.search.fitness import INVALID, UNSOLVED, Scores
+
+
+class Generation(NamedTuple):
+    """What a generation came to.
+
+    Attributes
+    ----------
+    generation
+        0 is the first population.
+    best, mean
+        Fitness of eq. 1 over the population [s]; 10^4 is a program that fails.
+    valid, distinct
+        Shares of the population that map to a program, and of different programs in it.
+    evaluations
+        Individuals scored since the run began, the first population included.
+    wall_s
+        Time since the run began, interruptions apart [s].
+    solved
+        Share of the population that reaches GOAL.
+    mean_solved
+        Their mean time to GOAL [s]; nan where there is none.
+    simulated
+        Programs simulated since the run began: evaluations that no earlier one answered.
+    steps
+        Simulation steps since the run began.
+    """
+
+    generation: int
+    best: float
+    mean: float
+    valid: float
+    distinct: float
+    evaluations: int
+    wall_s: float
+    solved: float
+    mean_solved: float
+    simulated: int
+    steps: int
+
+
+HISTORY = np.dtype(
+    [(name, "<i8" if kind == "int" else "<f8") for name, kind in Generation.__annotations__.items()]
+)
+"""A generation's dtype in checkpoints."""
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What has been spent so far."""
+
+    evaluations: int = 0
+    simulated: int = 0
+    steps: int = 0
+
+
+def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall_s: float) -> Generation:
+    """Sum up a generation.
+
+    Parameters
+    ----------
+    generation
+        Its number.
+    scores
+        The population's.
+    programs
+        How many different ones it holds.
+    totals
+        Spent so far.
+    wall_s
+        Time since the run began [s].
+    """
+    fitness = scores["fitness_s"]
+    solved = fitness < UNSOLVED
+    return Generation(
+        generation=generation,
+        best=float(fitness.min()),
+        mean=float(fitness.mean()),
+        valid=float(np.mean(scores["outcome"] != INVALID)),
+        distinct=programs / len(scores),
+        evaluations=totals.evaluations,
+        wall_s=wall_s,
+        solved=float(solved.mean()),
+        mean_solved=float(fitness[solved].mean()) if solved.any() else float("nan"),
+        simulated=totals.simulated,
+        steps=totals.steps,
+    )
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a run goes.
+
+    Attributes
+    ----------
+    evaluations_per_s
+        Individuals scored each second of late.
+    left_s
+        Time to the last generation at that rate [s].
+    """
+
+    evaluations_per_s: float
+    left_s: float
+
+
+_LATELY = 10
+
+
+def pace(history: Sequence[Generation], generations: int) -> Pace:
+    """Judge the pace by the latest generations.
+
+    Parameters
+    ----------
+    history
+        All so far, at least one.
+    generations
+        The number of the last.
+    """
+    last = history[-1]
+    first = history[-1 - _LATELY] if len(history) > _LATELY else Generation(-1, *[0] * 10)
+    seconds = max(last.wall_s - first.wall_s, 1e-9)
+    each_s = seconds / (last.generation - first.generation)
+    return Pace((last.evaluations - first.evaluations) / seconds, each_s * (generations - last.generation))

@@ -1,0 +1,148 @@
+"""What an evolution does: sizes, rates and which operators, with the paper's Table 4 as the default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from gecar.errors import InputError, expected
+
+TABLE_4_CROSSOVER_RATES = (0.4, 0.5, 0.7)
+TABLE_4_MUTATION_RATES = (0.03, 0.05, 0.07)
+MAX_CODONS_IN_ALL = 200_000_000
+"""Most codons of a whole population: 200 MB."""
+
+Rate = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+
+
+class Settings(BaseModel):
+    """An evolution's settings; the defaults are the paper's Table 4.
+
+    Attributes
+    ----------
+    population, generations
+        Individuals, and how often they are bred anew after the first population.
+    codons
+        Gene length: codons 0..255 of each genome.
+    elites
+        Best individuals that stay as they are.
+    initialisation
+        ``uniform``: random codons. ``sensible``: derivation trees grown or full, up to `initial_depth`
+        (Ryan and Azad 2003). ``ptc2``: trees of 1 to `initial_expansions` expansions, expanded at random
+        places (Luke 2000, Nicolau 2017).
+    initial_depth
+        Greatest depth of a ``sensible`` tree.
+    initial_expansions
+        Most codons a ``ptc2`` tree aims at.
+    selection
+        ``tournament``; or ``lexicase``: by the times between checkpoints, in random order, each as good as
+        the best within the median absolute deviation (Spector 2012, La Cava 2016).
+    tournament
+        Individuals in a tournament.
+    checkpoint_credit
+        Whether selection, and only it, prefers among programs that miss GOAL those that pass more
+        checkpoints, and pass them sooner.
+    crossover
+        ``one_point``: anywhere in the genome, the same point in both. ``one_point_used``: within the codons
+        both parents use. ``subtree``: subtrees of the same nonterminal change places.
+    crossover_rate
+        Share of pairs that are crossed.
+    mutation
+        ``codon``: any codon of the genome. ``used_codon``: only codons the child uses. ``renew``: every child
+        is a new random individual, which makes the whole a random search.
+    mutation_rate
+        Probability of a codon to be drawn anew.
+    creep_rate
+        Probability of a used codon that chooses a number to step to a neighbouring one.
+    duplicates
+        ``kept``; or bred again, up to `attempts` times, where the same program is already in the
+        ``generation``, or was simulated before in the ``run``.
+    attempts
+        How often a duplicate is bred again.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    population: int = Field(200, ge=2, le=1_000_000)
+    generations: int = Field(50, ge=0, le=1_000_000)
+    codons: int = Field(1_000, ge=1, le=1_000_000)
+    elites: int = Field(1, ge=0)
+    initialisation: Literal["uniform", "sensible", "ptc2"] = "uniform"
+    initial_depth: int = Field(8, ge=1, le=1_000)
+    initial_expansions: int = Field(40, ge=1, le=10_000)
+    selection: Literal["tournament", "lexicase"] = "tournament"
+    tournament: int = Field(5, ge=1, le=1_000_000)
+    checkpoint_credit: bool = False
+    crossover: Literal["one_point", "one_point_used", "subtree"] = "one_point"
+    crossover_rate: Rate = 0.5
+    mutation: Literal["codon", "used_codon", "renew"] = "codon"
+    mutation_rate: Rate = 0.05
+    creep_rate: Rate = 0.0
+    duplicates: Literal["kept", "generation", "run"] = "kept"
+    attempts: int = Field(10, ge=1, le=1_000)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Settings:
+        if self.elites >= self.population:
+            raise ValueError(
+                f"found elites = {self.elites}, expected fewer than population = {self.population}"
+            )
+        if self.population * self.codons > MAX_CODONS_IN_ALL:
+            size = f"{self.population} x {self.codons} codons"
+            raise ValueError(f"found population x codons = {size}, expected at most {MAX_CODONS_IN_ALL}")
+        return self
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of a whole run, the first population included."""
+        return self.population * (self.generations + 1)
+
+    @property
+    def needs_arrivals(self) -> bool:
+        """Whether selection looks at when each checkpoint was passed."""
+        return self.selection == "lexicase"
+
+
+PRESETS = {
+    "paper": Settings(),
+    "random": Settings(mutation="renew", crossover_rate=0.0),
+}
+"""Settings by name: the paper's, and random search at the same budget."""
+
+
+def preset(name: str, changes: Mapping[str, Any] | None = None, where: str = "search") -> Settings:
+    """Return a preset's settings, some of them changed.
+
+    Parameters
+    ----------
+    name
+        One of `PRESETS`.
+    changes
+        Settings by name that differ from the preset's.
+    where
+        Where the changes stand, for errors.
+
+    Raises
+    ------
+    InputError
+        If there is no such preset or setting, or a value is out of bounds; names it.
+    """
+    if name not in PRESETS:
+        raise expected("preset", repr(name), f"one of {', '.join(PRESETS)}")
+    try:
+        return Settings.model_validate({**PRESETS[name].model_dump(), **(changes or {})})
+    except ValidationError as error:
+        raise _first_fault(error, where) from None
+
+
+def _first_fault(error: ValidationError, where: str) -> InputError:
+    fault = error.errors(include_url=False)[0]
+    place = ".".join([where, *map(str, fault["loc"])])
+    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if message.startswith("found "):
+        return InputError(f"{place}: {message}")
+    if fault["type"] == "extra_forbidden":
+        return expected(place, "an unknown setting", f"one of {', '.join(Settings.model_fields)}")
+    return expected(place, repr(fault["input"])[:40], message)
