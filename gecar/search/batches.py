@@ -1,0 +1,145 @@
+"""Programs cut into batches, run on an executor, and run again where a worker died."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from gecar.errors import InputError
+from gecar.language.opcodes import N_COLUMNS
+from gecar.search.evaluation import Evaluator, Opcodes, Scored, recipe, score_batch
+from gecar.search.executors import SerialExecutor
+from gecar.search.fitness import Scores
+from gecar.search.state import Candidate
+
+LONGEST_S = 0.1
+"""Longest batch aimed at: long enough that sending it costs nothing, short enough to share work evenly."""
+SHORTEST_S = 0.002
+"""Shortest batch aimed at: sending one through a process pool costs about 0.2 ms."""
+MAX_DEATHS = 3
+"""How often in a row workers may die without finishing anything."""
+
+_EMPTY = np.zeros((0, N_COLUMNS), np.int32)
+
+
+class Batches:
+    """Scores programs on an executor. The scores depend on the programs alone, not on how they are cut or run.
+
+    Parameters
+    ----------
+    evaluator
+        What scores a program.
+    open_executor
+        Makes the executor, and makes it again after a worker died.
+    workers
+        How many batches the executor runs side by side.
+    shortest_s
+        Shortest batch aimed at [s].
+    """
+
+    def __init__(
+        self,
+        evaluator: Evaluator,
+        open_executor: Callable[[], Executor] = SerialExecutor,
+        workers: int = 1,
+        shortest_s: float = SHORTEST_S,
+    ) -> None:
+        self.workers = workers
+        self.busy_s = 0.0
+        self._recipe = recipe(evaluator)
+        self._open = open_executor
+        self._executor: Executor | None = None
+        self._shortest_s = shortest_s
+        self._each_s = 0.001  # a guess, until the first batch has been timed
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def warm(self) -> None:
+        """Start the workers and let each load what it needs, before the clock runs."""
+        self._run([([_EMPTY], [0])] * self.workers)
+
+    def __call__(self, candidates: Sequence[Candidate]) -> Scores:
+        """Return a score for each candidate.
+
+        Raises
+        ------
+        InputError
+            If workers die again and again.
+        """
+        programs, seeds = [c.program.opcodes for c in candidates], [c.seed for c in candidates]
+        done = self._run([(programs[piece], seeds[piece]) for piece in self._cut(len(candidates))])
+        seconds = sum(scored.seconds for scored in done)
+        self.busy_s += seconds
+        if candidates:
+            self._each_s = max(seconds / len(candidates), 1e-6)
+        return np.concatenate([scored.scores for scored in done])
+
+    def close(self) -> None:
+        """Let the workers go; what they still do is dropped."""
+        if self._executor is not None:
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor = None
+
+    def _cut(self, n: int) -> list[slice]:
+        """Cut n programs so that no worker waits long for another, and no batch is not worth sending."""
+        share_s = n * self._each_s / (4 * self.workers)
+        size = max(1, round(min(max(share_s, self._shortest_s), LONGEST_S) / self._each_s))
+        if self.workers == 1:
+            size = max(n, 1)
+        return [slice(begin, begin + size) for begin in range(0, max(n, 1), size)]
+
+    def _run(self, batches: list[tuple[Sequence[Opcodes], Sequence[int]]]) -> list[Scored]:
+        """Run the batches, those that were lost with their worker again; in the order given."""
+        done: dict[int, Scored] = {}
+        deaths = 0
+        while len(done) < len(batches):
+            lost = [k for k in range(len(batches)) if k not in done]
+            finished = self._attempt({k: batches[k] for k in lost})
+            done |= finished
+            if len(done) < len(batches):
+                deaths = 1 if finished else deaths + 1
+                self._recover(len(batches) - len(done), deaths)
+        return [done[k] for k in range(len(batches))]
+
+    def _attempt(self, batches: dict[int, tuple[Sequence[Opcodes], Sequence[int]]]) -> dict[int, Scored]:
+        """Run batches; return those whose worker lived."""
+        if self._executor is None:
+            self._executor = self._open()
+        futures: dict[int, Future[Scored]] = {}
+        done: dict[int, Scored] = {}
+        try:
+            for k, (programs, seeds) in batches.items():
+                futures[k] = self._executor.submit(score_batch, self._recipe, programs, seeds)
+        except BrokenExecutor:
+            pass  # the batches not sent are lost like those of the worker that died
+        for k, future in futures.items():
+            try:
+                done[k] = future.result()
+            except BrokenExecutor:
+                continue
+        return done
+
+    def _recover(self, lost: int, deaths: int) -> None:
+        self.close()
+        if deaths > MAX_DEATHS:
+            raise InputError(
+                f"workers: found that they died {deaths} times in a row (killed, or out of memory), "
+                "expected them to live; fewer workers need less memory"
+            )
+        batches = "batch" if lost == 1 else "batches"
+        print(
+            f"a worker died; started new ones, and {lost} lost {batches} run again",
+            file=sys.stderr,
+            flush=True,
+        )
