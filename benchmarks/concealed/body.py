@@ -33,7 +33,7 @@ _HARD = 'solimp{0}="0.9999 0.9999 0.001" solref{0}="0.003 1"'
 # Contacts. MuJoCo's cone couples sliding to lifting: with an impedance near 1 a dragging caster hops, and the wheels
 # lose 5 % of their way. An impedance of 0.01 makes the normal a plain spring and damper (4e5 1/s^2: the tyres sink by
 # 7 micrometres), a hundred times softer than the lift, while impratio keeps the tangential part hard: creep is below
-# 0.01 % of the way, and slip ends within 1 ms.
+# 0.03 % of the way, and slip ends within 1 ms.
 _IMPEDANCE = 0.01
 _STIFFNESS = 4.0e5
 _STICK_RATE = 1000.0
