@@ -12,6 +12,7 @@ from gecar.world.tiles import Side, Stroke
 
 # Coordinates are snapped to a nanometre, so that neighbouring tiles' pieces share their corners exactly.
 _GRID_M = 1e-9
+_MIDDLES = {side.middle for side in Side}
 
 
 def _on_field(layout: Layout, index: int, stroke: Stroke) -> LineString:
@@ -32,7 +33,7 @@ def line_area(layout: Layout) -> MultiPolygon:
     """Return the area the line covers [m]: its strokes, one line width wide, with sharp corners."""
     half = 0.5 * layout.line_width_m
     pieces = [
-        _on_field(layout, k, stroke)
+        _on_field(layout, k, _past_edges(stroke))
         .buffer(half, cap_style="flat", join_style="mitre")
         .intersection(layout.square(k))
         for k in range(len(layout.characters))
@@ -42,6 +43,13 @@ def line_area(layout: Layout) -> MultiPolygon:
     whole = shapely.union_all([*pieces, *joints], grid_size=_GRID_M)
     parts = [part for part in getattr(whole, "geoms", [whole]) if isinstance(part, Polygon)]
     return MultiPolygon([part for part in parts if not part.is_empty])
+
+
+def _past_edges(stroke: Stroke) -> Stroke:
+    """Lengthen a stroke past the edges it ends at, at right angles to them, so that neighbours meet flush."""
+    before = [(2.0 * x - 0.5, 2.0 * y - 0.5) for x, y in stroke[:1] if (x, y) in _MIDDLES]
+    after = [(2.0 * x - 0.5, 2.0 * y - 0.5) for x, y in stroke[-1:] if (x, y) in _MIDDLES]
+    return (*before, *stroke, *after)
 
 
 def _with_joint(layout: Layout) -> list[int]:

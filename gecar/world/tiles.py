@@ -38,8 +38,8 @@ Stroke = tuple[Point, ...]
 GAP = 0.20
 # Zigzag: stubs that meet the neighbours at a right angle, then swings to both sides of the middle.
 _STUB, _SWING = 0.15, 0.10
-# A quarter circle in this many chords leaves it by at most 0.02 mm on the default tile.
-_ARC_CHORDS = 24
+# A quarter circle in this many chords leaves it by at most 0.011 mm on the default tile.
+_ARC_CHORDS = 64
 
 
 class Side(IntEnum):
