@@ -51,7 +51,8 @@ def convergence(
     Parameters
     ----------
     history
-        Columns of ``history.csv``, each (generations,): generation, best, mean [s], valid, distinct [shares].
+        Columns of ``history.csv``, each (generations,): generation, best, mean [s], valid, distinct [shares]; if there,
+        also solved [share] and mean_solved [s].
     references
         Times to draw across the picture.
     title, detail
@@ -63,6 +64,8 @@ def convergence(
         headline(figure, title, detail)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
         draw_best(top, generation, best, references)
+        if "mean_solved" in history:
+            _draw_mean_solved(top, generation, history["mean_solved"])
         _draw_mean(middle, generation, history["mean"])
         _draw_shares(bottom, history)
         bottom.set_xlabel("generation")
@@ -93,6 +96,16 @@ def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence
             weight="bold",
             color=BLUE,
         )
+
+
+def _draw_mean_solved(axes: Axes, generation: Series, mean: Series) -> None:
+    """Draw the mean time of programs at GOAL, as far as the picture of the best reaches."""
+    axes.plot(generation, mean, color=ORANGE, linewidth=1.2, zorder=2.5)
+    last = len(mean) - 1
+    if np.isfinite(mean[last]) and mean[last] < axes.get_ylim()[1]:
+        words = "mean of those at GOAL"
+        axes.annotate(words, (generation[last], mean[last]), (-4, 4), textcoords="offset points", ha="right", size=8,
+                      color=ORANGE)  # fmt: skip
 
 
 def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
@@ -165,8 +178,10 @@ def _draw_shares(axes: Axes, history: Mapping[str, Series]) -> None:
     marker = _marker(generation)
     axes.plot(generation, 100 * history["valid"], color=GREEN, marker=marker, label="valid")
     axes.plot(generation, 100 * history["distinct"], color=PURPLE, marker=marker, label="distinct programs")
+    if "solved" in history:
+        axes.plot(generation, 100 * history["solved"], color=BLUE, marker=marker, label="at GOAL")
     axes.set(ylabel="population [%]", ylim=(-4, 108))
-    axes.legend(ncols=2, loc="upper right", bbox_to_anchor=(1.0, 1.2), borderaxespad=0.0)
+    axes.legend(ncols=3, loc="upper right", bbox_to_anchor=(1.0, 1.2), borderaxespad=0.0)
 
 
 def _marker(generation: Series) -> str | None:

@@ -1,0 +1,72 @@
+"""``gecar effects``: the catalogue of physics a simulation may have left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gecar.cli.voice import JsonOption, Voice
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.world.effects import Effect
+
+IdArgument = Annotated[
+    str | None,
+    typer.Argument(metavar="[ID]", help="One effect, with all that is known of it.", show_default=False),
+]
+
+
+def effects(effect: IdArgument = None, as_json: JsonOption = False) -> None:
+    r"""List the physics a simulation may have left out.
+
+    Each is a group of parameters with neutral values at which it vanishes; in a robot file it is a section
+    [bold]\\[effects.ID][/]. A verdict of [bold]gecar discover[/] names them.
+
+    [bold]Examples[/]
+
+      gecar effects
+      gecar effects backlash
+    """
+    from rich.table import Table
+
+    from gecar.world.effects import BY_ID, CATALOGUE
+
+    voice = Voice(as_json)
+    if effect is not None and effect not in BY_ID:
+        raise expected("effect", f"'{effect}'", f"one of {', '.join(BY_ID)}")
+    if effect is not None:
+        _describe(voice, BY_ID[effect])
+    else:
+        table = Table("effect", "what it is", "where it shows", box=None, pad_edge=False)
+        for each in CATALOGUE:
+            table.add_row(each.id, each.title, each.signature)
+        voice.say(table)
+    voice.answer({"effects": [_facts(each) for each in CATALOGUE if effect in (None, each.id)]})
+
+
+def _describe(voice: Voice, effect: Effect) -> None:
+    voice.say(f"{effect.id}: {effect.title}", style="bold")
+    voice.say(f"Shows in {', '.join(effect.channels)}: {effect.signature}.")
+    voice.say(f"Source: {effect.source}.")
+    voice.say(f"In a robot file:\n\n[effects.{effect.id}]")
+    for p in effect.parameters:
+        neutral = "the robot's own" if p.neutral is None else f"{p.neutral:g}"
+        start = p.low if p.neutral is None else p.neutral
+        voice.say(f"{p.label} = {start:g}  # {p.unit}, {p.low:g} to {p.high:g}; neutral: {neutral}")
+
+
+def _facts(effect: Effect) -> dict[str, Any]:
+    parameters = {
+        p.label: {
+            "unit": p.unit,
+            "low": p.low,
+            "high": p.high,
+            "neutral": p.neutral,
+            "worthwhile": p.worthwhile,
+        }
+        for p in effect.parameters
+    }
+    return {"id": effect.id, "title": effect.title, "channels": effect.channels, "signature": effect.signature,
+            "source": effect.source, "parameters": parameters}  # fmt: skip
