@@ -1,0 +1,84 @@
+"""`gecar export` and `gecar import` as typed."""
+
+import pytest
+from synthetic import drive
+from test_import import brick_log, camera_log
+
+PROGRAM = "if SensorValue > 80: motor(80,80,50)\nelse: motor(80,0,160)\n"
+
+
+@pytest.fixture
+def program(tmp_path):
+    (tmp_path / "best.txt").write_text(PROGRAM)
+    return "best.txt"
+
+
+@pytest.fixture
+def logs(tmp_path):
+    run = drive(3)
+    (tmp_path / "log.csv").write_text(brick_log(run))
+    (tmp_path / "camera.csv").write_text(camera_log(run, shift=-20.0))
+    return "log.csv", "camera.csv"
+
+
+def test_export_writes_a_folder_for_the_brick(gecar, program, tmp_path):
+    ended = gecar("export", program, "--json")
+    assert ended.json["files"] == [
+        "brick/main.py",
+        "brick/.vscode/launch.json",
+        "brick/.vscode/settings.json",
+    ]
+    assert "        motor(80, 0, 160)\n" in (tmp_path / "brick/main.py").read_text()
+
+
+def test_export_of_a_run_takes_its_best_program(gecar, program):
+    assert "Written: b/main.py" in gecar("export", ".", "--target", "pybricks4", "--out", "b").out
+    assert "found a file that is there" in gecar.error("export", ".", "--target", "pybricks4", "--out", "b")
+    assert gecar("export", ".", "--target", "pybricks4", "--out", "b", "--force").code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--target", "nxt"), "'nxt'"),
+        (("--sensor", "7"), "'7'"),
+        (("--left-motor", "Q"), "'Q'"),
+        (("--robot", "nobody"), "nobody"),
+    ],
+)
+def test_export_names_what_is_wrong(gecar, program, options, named):
+    assert named in gecar.error("export", program, *options)
+
+
+def test_import_writes_a_recording_and_says_what_it_took_for_what(gecar, logs, program, tmp_path):
+    found = gecar("import", *logs, "--program", program, "--place", "--json").json
+    assert found["recording"] == "recordings/log.csv"
+    assert found["clock_offset"]["offset_s"] == pytest.approx(20.0, abs=0.003)
+    assert "log.csv: 't_s' is t_s, in s (steps of 0.01)" in found["guesses"]
+    assert "motor(80,0,160)" in (tmp_path / "recordings/log.toml").read_text()
+    again = gecar.error("import", *logs)
+    assert "recordings/log.csv: found a file that is there" in again
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--column", "x"), "--column"),
+        (("--constant", "left_duty_pct=full"), "'full'"),
+        (("--constant", "t_s=1"), "--constant"),
+        (("--origin", "1"), "--origin"),
+        (("--scale", "-1"), "--scale"),
+        (("--offset", "nan"), "--offset"),
+        (("--out", "here"), "--out"),
+        (("--course", "none", "--place"), "a course with a START"),
+        (("--course", "nowhere"), "nowhere"),
+        (("--run", "4"), "--run"),
+        (("--program", "none.txt"), "none.txt"),
+    ],
+)
+def test_import_names_what_is_wrong(gecar, logs, options, named):
+    assert named in gecar.error("import", *logs, *options)
+
+
+def test_import_of_three_files_is_refused(gecar, logs):
+    assert "found 3 files" in gecar.error("import", *logs, "log.csv")
