@@ -1,5 +1,7 @@
 """Import: what people have on disk becomes the recording it came from; damage is mended or refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -190,6 +192,23 @@ def test_mark_off_the_axle_is_moved_onto_it(bring_in, run):
     assert max(np.std(e) for e in pose_errors(imported, run)[:2]) < 0.003
 
 
+def test_columns_named_as_a_recordings_keep_their_frame(bring_in, run):
+    mirrored = camera_log(run, factors={"y_m": -1.0, "heading_deg": -1.0})
+    imported = bring_in(brick_log(run), mirrored)
+    assert (
+        np.std(imported.recording.y_m[~np.isnan(imported.recording.y_m)] + run.y_m[~np.isnan(run.y_m)]) < 1e-6
+    )
+    assert any("y points down? Left as it is" in line for line in imported.repairs)
+    other = bring_in(brick_log(run), mirrored.replace("x_m,y_m,heading_deg", "x,y,theta_deg"))
+    assert any("y points down: turned over" in line for line in other.repairs)
+
+
+def test_camera_that_sees_less_than_the_wheels_tell_is_believed(bring_in, run):
+    imported = bring_in(brick_log(run), camera_log(run, factors={"x_m": 0.7, "y_m": 0.7}))
+    assert np.nanmax(np.abs(imported.recording.x_m)) < 0.72 * np.nanmax(np.abs(run.x_m))
+    assert any("it moves 0.70 times as far as the wheels" in line for line in imported.repairs)
+
+
 def test_first_pose_is_put_on_the_start(bring_in, run):
     imported = bring_in(brick_log(run), camera_log(run), frame=Frame(start=(0.15, 0.6, np.pi / 2)))
     found = imported.recording
@@ -225,6 +244,28 @@ def test_what_is_imported_is_a_recording(tmp_path, bring_in, run):
     again = read_recording(tmp_path / "run.csv")
     np.testing.assert_allclose(again.x_m, imported.recording.x_m, atol=1e-8)
     assert again.setup.notes == "imported from file0.txt and file1.txt"
+
+
+# --- recordings of a 3D simulation, where they are at hand
+
+PRACTICE = sorted((Path(__file__).parents[2] / "shared/recordings/practice/p01").glob("*.csv"))
+
+
+@pytest.mark.skipif(not PRACTICE, reason="needs ../shared/recordings/practice")
+def test_practice_recordings_come_through_as_they_are(tmp_path):
+    for path in PRACTICE:
+        recording = read_recording(path)
+        imported = import_logs([path], load_robot("ev3"), Setup(), ImportOptions())
+        assert imported.repairs == ()
+        assert_same(imported, recording, tuple(COLUMNS)[:10], atol=1e-9)
+
+
+@pytest.mark.skipif(not PRACTICE, reason="needs ../shared/recordings/practice")
+def test_practice_logs_in_two_files_are_joined_within_four_milliseconds(bring_in):
+    for path in PRACTICE:
+        recording = read_recording(path)
+        imported = bring_in(brick_log(recording), camera_log(recording, shift=33.3))
+        assert imported.offset.offset_s == pytest.approx(-33.3, abs=0.004)
 
 
 # --- clocks

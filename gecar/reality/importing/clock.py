@@ -26,9 +26,8 @@ _GRID_S = 0.02
 _REACH_S = 0.06
 _LEAST_OVERLAP_S = 2.0
 _BLOCKS = 12
-_CREEP_S = (
-    0.0015  # on a grippy floor tyres creep: the camera reads as late by as much (the same 96 recordings)
-)
+_LEAST_AGREEMENT = 0.8
+_CREEP_S = 0.0015  # tyres creep on a grippy floor: the camera reads as late by as much (the same recordings)
 _BEND_S = 0.4  # long enough that the bend of a path stands out of a camera's noise
 
 
@@ -59,15 +58,15 @@ class ClockOffset:
 
 @dataclass(frozen=True)
 class Likeness:
-    """How a camera's units and axes compare with the encoders'.
+    """How a camera's units and axes compare with the encoders', as far as their motions agree.
 
     Attributes
     ----------
     scale
-        The camera's unit of length [m]; NaN if the robot hardly moved.
+        The camera's unit of length [m]; NaN if the robot hardly moved, or its wheels slipped.
     heading_factor
         Radians per unit of the camera's heading, negative if it counts clockwise; NaN without headings, or
-        if the robot hardly turned.
+        if the robot hardly turned, or its wheels slipped.
     mirrored
         Whether the camera's axes are a mirror image (y down); ``None`` if the path bends too little to say.
     """
@@ -104,13 +103,16 @@ def compare(brick: Track, camera: Track, offset: float) -> Likeness:
     if len(at) < 2 * _BLOCKS:
         return Likeness(float("nan"), float("nan"), None)
     told, seen = windows(brick, at + offset, _WINDOW_S), windows(camera, at, _WINDOW_S)
-    factors = [
-        1.0 / _fit(a, b)[0] if np.std(a) > least else np.nan
-        for a, b, least in zip(told, seen, (0.002, 0.02), strict=False)
-    ]
-    return Likeness(
-        factors[0], factors[1] if len(factors) > 1 else float("nan"), _mirrored(brick, camera, offset)
-    )
+    scale = _factor(told[0], seen[0], 0.002)
+    heading_factor = _factor(told[1], seen[1], 0.02) if len(seen) > 1 else float("nan")
+    return Likeness(scale, heading_factor, _mirrored(brick, camera, offset) if np.isfinite(scale) else None)
+
+
+def _factor(told: Series, seen: Series, least: float) -> float:
+    """Return the factor from what a camera saw to what the encoders told; NaN if they do not agree on it."""
+    if np.std(told) < least or np.std(seen) == 0.0 or abs(np.corrcoef(told, seen)[0, 1]) < _LEAST_AGREEMENT:
+        return float("nan")
+    return 1.0 / _fit(told, seen)[0]
 
 
 def _coarse_offset(brick: Track, camera: Track) -> tuple[float, float, float]:

@@ -109,7 +109,7 @@ def heading_offset(track: Track, forward: Series, turning: Series) -> float | No
     Returns
     -------
     float
-        ``None`` if it moved on, in arcs wider than 0.2 m, for less than twenty samples.
+        ``None`` if it moved on, in arcs wider than 0.2 m, for less than twenty samples, or slid.
     """
     going = (np.abs(forward) > 0.1) & (np.abs(turning) < np.abs(forward) / 0.2)
     if track.heading is None or going.sum() < 20:
@@ -117,4 +117,6 @@ def heading_offset(track: Track, forward: Series, turning: Series) -> float | No
     dx, dy = np.gradient(track.x, track.t_s), np.gradient(track.y, track.t_s)
     facing = np.arctan2(dy * np.sign(forward), dx * np.sign(forward))
     difference = np.exp(1j * (track.heading - facing))[going]
-    return float(np.angle(np.median(difference.real) + 1j * np.median(difference.imag)))
+    off = np.angle(np.median(difference.real) + 1j * np.median(difference.imag))
+    slid = np.median(np.abs(np.angle(difference * np.exp(-1j * off)))) > np.deg2rad(6.0)
+    return None if slid else float(off)

@@ -16,9 +16,9 @@ from gecar.reality.importing.track import Track, odometry
 from gecar.reality.importing.units import UNITS
 from gecar.world.robot import Robot
 
-# Below these an offset is as likely chance as truth: the correlation, and by how many times the next best offset
-# leaves more of the motion unexplained. Of 96 recordings of a 3D simulation 4 were refused (6 without headings), and
-# no offset that passed was off by more than 45 ms, though wheels slipped in a third of them.
+# Below these an offset is as likely chance as truth: the correlation, and by how many times the next best
+# offset leaves more of the motion unexplained. Of 96 recordings of a 3D simulation 4 were refused (6 without
+# headings), and no offset that passed was off by more than 45 ms, though wheels slipped in a third of them.
 _LEAST_CORRELATION = 0.75
 _LEAST_LEAD = 1.5
 _SAME_ROW_S = 5e-5
@@ -64,7 +64,8 @@ def join(brick: Log, camera: Log | None, robot: Robot, frame: Frame, offset_s: f
     offset = offset_s or 0.0 if camera is not None else 0.0
     likeness = compare(told, seen, offset) if told else Likeness(np.nan, np.nan, None)
     seen, frame = _settle(joining, seen_by, seen, frame, likeness)
-    frame = _zero_heading(joining, told, seen, frame, offset)
+    if frame.heading_zero_deg is None and not seen_by.in_frame:
+        frame = _zero_heading(joining, told, seen, frame, offset)
     track = to_course(seen, frame)
     merge_pose(joining, replace(track, t_s=track.t_s + offset), own_clock=camera is not None)
     return joining
@@ -121,24 +122,33 @@ def _align(joining: Joining, told: Track | None, seen: Track) -> float:
 
 def _settle(joining: Joining, log: Log, seen: Track, frame: Frame, likeness: Likeness) -> tuple[Track, Frame]:
     """Decide the camera's unit, axes and direction of headings, from what was said, or else from motion."""
-    seen, factor = _scaled(joining, log, seen, frame, likeness)
+    seen, unit = _scaled(joining, log, seen, frame, likeness)
     if frame.origin is not None:
-        frame = replace(frame, origin=(frame.origin[0] * factor, frame.origin[1] * factor))
-    if frame.y_down is None and likeness.mirrored:
-        joining.lines.append(
-            "camera: its path bends against the encoders: y taken to point down (--y-up if not)"
-        )
-        frame = replace(frame, y_down=True)
+        frame = replace(frame, origin=(frame.origin[0] * unit, frame.origin[1] * unit))
     turns = likeness.heading_factor
-    if seen.heading is not None and not log.heading_said and np.isfinite(turns):
-        for unit, true in (("deg", np.pi / 180.0), ("rad", 180.0 / np.pi)):
-            if abs(np.log(abs(turns) / true)) < 0.3:
-                joining.lines.append(f"camera: by the encoders, its headings are in {unit}")
+    if seen.heading is not None and not log.heading_said:
+        for name, true in (("deg", np.pi / 180.0), ("rad", 180.0 / np.pi)):
+            if 0.5 < abs(turns) / true < 2.0:
+                joining.lines.append(f"camera: by the encoders, its headings are in {name}")
                 seen, turns = replace(seen, heading=seen.heading * true), turns / true
+    if frame.y_down is None and likeness.mirrored:
+        frame = _turned_over(
+            joining, log, frame, "its path bends against the encoders: y points down", "y_down"
+        )
     if frame.heading_clockwise is None and turns < -0.5:
-        joining.lines.append("camera: its headings count clockwise, by the encoders")
-        frame = replace(frame, heading_clockwise=True)
+        frame = _turned_over(
+            joining, log, frame, "by the encoders, its headings count clockwise", "heading_clockwise"
+        )
     return seen, frame
+
+
+def _turned_over(joining: Joining, log: Log, frame: Frame, finding: str, axis: str) -> Frame:
+    """Turn an axis over; but where the names claim the recording's own frame, only say what was found."""
+    if log.in_frame:
+        joining.lines.append(f"camera: {finding}? Left as it is, for its columns are named as a recording's")
+        return frame
+    joining.lines.append(f"camera: {finding}: turned over")
+    return replace(frame, y_down=True) if axis == "y_down" else replace(frame, heading_clockwise=True)
 
 
 def _scaled(joining: Joining, log: Log, seen: Track, frame: Frame, likeness: Likeness) -> tuple[Track, float]:
@@ -146,28 +156,25 @@ def _scaled(joining: Joining, log: Log, seen: Track, frame: Frame, likeness: Lik
     assumed = UNITS["length"][log.length_unit]
     if frame.scale is not None:
         return _times(seen, frame.scale / assumed), frame.scale
-    unit = likeness.scale * assumed
-    if log.length_unit != "px":
-        if not np.isfinite(unit) or _near(likeness.scale):
-            return seen, assumed
-        for name in ("m", "cm", "mm"):
-            metres = UNITS["length"][name]
-            if _near(unit / metres):
-                joining.lines.append(f"camera: by the encoders, its unit is {name}, not {log.length_unit}")
-                return _times(seen, metres / assumed), metres
-    if not np.isfinite(unit):
-        raise InputError(
-            f"{log.name}: positions in pixels, and no motion of encoders to scale them by: --scale METRES"
+    ratio, pixels = likeness.scale, log.length_unit == "px"
+    if pixels and not np.isfinite(ratio):
+        raise InputError(f"{log.name}: positions in pixels, and no encoders to scale them by: --scale METRES")
+    if not pixels and (not np.isfinite(ratio) or 0.88 < ratio < 1.14):
+        return seen, assumed
+    if not pixels and 0.5 < ratio < 2.0:
+        joining.lines.append(
+            f"camera: it moves {1 / ratio:.2f} times as far as the wheels: slip, wheels, or --scale?"
         )
+        return seen, assumed
+    for name in () if pixels else ("m", "cm", "mm"):
+        metres = UNITS["length"][name]
+        if 0.8 < ratio * assumed / metres < 1.25:
+            joining.lines.append(f"camera: by the encoders, its unit is {name}, not {log.length_unit}")
+            return _times(seen, metres / assumed), metres
     joining.lines.append(
-        f"camera: by the encoders and the wheels, its unit is {unit:.4g} m (--scale says otherwise)"
+        f"camera: by the wheels, its unit is {ratio * assumed:.4g} m (--scale says otherwise)"
     )
-    return _times(seen, likeness.scale), unit
-
-
-def _near(ratio: float) -> bool:
-    """Say whether a ratio is 1 but for slip, and wheels a little larger or smaller than the robot file's."""
-    return 0.88 < ratio < 1.14
+    return _times(seen, ratio), ratio * assumed
 
 
 def _times(track: Track, factor: float) -> Track:
@@ -176,17 +183,15 @@ def _times(track: Track, factor: float) -> Track:
 
 def _zero_heading(joining: Joining, told: Track | None, seen: Track, frame: Frame, offset: float) -> Frame:
     """Find the heading the camera gives a robot that faces along x, from how it moves."""
-    if frame.heading_zero_deg is not None or seen.heading is None or told is None or told.heading is None:
+    if told is None or told.heading is None:
         return frame
     flat = to_course(seen, Frame(y_down=frame.y_down, heading_clockwise=frame.heading_clockwise))
-    step = 0.1
-    before, after = seen.t_s + offset - step, seen.t_s + offset + step
-    moved = [
-        np.interp(after, told.t_s, v) - np.interp(before, told.t_s, v) for v in (told.x, told.y, told.heading)
-    ]
+    before, after = seen.t_s + offset - 0.1, seen.t_s + offset + 0.1
     way = np.interp(seen.t_s + offset, told.t_s, told.heading)
-    forward = (moved[0] * np.cos(way) + moved[1] * np.sin(way)) / (2 * step)
-    off = heading_offset(flat, forward, moved[2] / (2 * step))
+    x, y, turn = (
+        np.interp(after, told.t_s, v) - np.interp(before, told.t_s, v) for v in (told.x, told.y, told.heading)
+    )
+    off = heading_offset(flat, (x * np.cos(way) + y * np.sin(way)) / 0.2, turn / 0.2)
     if off is None or abs(off) < np.deg2rad(5.0):
         return frame
     degrees = float(np.rad2deg(off)) * (-1.0 if frame.heading_clockwise else 1.0)

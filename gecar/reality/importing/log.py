@@ -10,7 +10,7 @@ import numpy as np
 from gecar.errors import InputError, expected
 from gecar.reality.columns import COLUMNS, Series
 from gecar.reality.importing.foreign import ForeignTable
-from gecar.reality.importing.meaning import Meaning, guess_meanings
+from gecar.reality.importing.meaning import Meaning, Said, guess_meanings
 from gecar.reality.importing.repair import increasing_rows, lost_poses, mend_encoder
 from gecar.reality.importing.units import (
     QUANTITY,
@@ -25,6 +25,7 @@ from gecar.reality.importing.units import (
 )
 
 DUTIES = ("left_duty_pct", "right_duty_pct")
+POSE = ("x_m", "y_m", "heading_deg")
 _EPOCH_S = 1e6  # a clock that shows more than eleven days counts from 1970 or from the machine's start
 
 
@@ -44,6 +45,8 @@ class Log:
         Unit that x and y were taken to be in.
     heading_said
         Whether the user said the unit of headings.
+    in_frame
+        Whether positions and headings go by the recording's own names, and so claim to be in its frame.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Log:
     remarks: tuple[str, ...]
     length_unit: str
     heading_said: bool
+    in_frame: bool
 
     @property
     def has_commands(self) -> bool:
@@ -68,7 +72,7 @@ class Log:
 class _Reading:
     """The work of understanding one table; `Log` is what remains."""
 
-    def __init__(self, table: ForeignTable, said: Mapping[str, tuple[str | None, str | None]]) -> None:
+    def __init__(self, table: ForeignTable, said: Mapping[str, Said]) -> None:
         self.name = table.source.name
         self.meanings: dict[str, Meaning] = {}
         self.units: dict[str, str] = {}
@@ -110,8 +114,17 @@ class _Reading:
         return self.meanings[column].unit or guess[0], guess[1]
 
 
-def understand(table: ForeignTable, said: Mapping[str, tuple[str | None, str | None]]) -> Log:
+def understand(table: ForeignTable, said: Mapping[str, Said], expected_dps: float) -> Log:
     """Name a table's columns, bring them into the recording's units and mend what is damaged.
+
+    Parameters
+    ----------
+    table
+        The file's table.
+    said
+        What the user said of its columns, by name.
+    expected_dps
+        Speed of the robot's motors per percent of duty [deg/s], to tell the encoders' unit by.
 
     Raises
     ------
@@ -121,7 +134,7 @@ def understand(table: ForeignTable, said: Mapping[str, tuple[str | None, str | N
     reading = _Reading(table, said)
     _read_time(reading)
     _read_plain(reading)
-    _read_encoders(reading)
+    _read_encoders(reading, expected_dps)
     _read_pose(reading)
     if reading.passed_over:
         reading.guesses.append(
@@ -136,6 +149,9 @@ def understand(table: ForeignTable, said: Mapping[str, tuple[str | None, str | N
         remarks=table.remarks,
         length_unit=reading.units.get("x_m", "m"),
         heading_said=bool(heading and heading.said and heading.unit),
+        in_frame=all(
+            meaning.name == column for column, meaning in reading.meanings.items() if column in POSE
+        ),
     )
 
 
@@ -184,14 +200,14 @@ def _read_plain(reading: _Reading) -> None:
         reading.convert("yaw_rate_dps", *reading.named_or("yaw_rate_dps", ("dps", "unless said otherwise")))
 
 
-def _read_encoders(reading: _Reading) -> None:
+def _read_encoders(reading: _Reading, expected_dps: float) -> None:
     for side in ("left", "right"):
         column = f"{side}_angle_deg"
         if column not in reading.columns:
             continue
         meaning = reading.meanings[column]
         duty = reading.columns.get(f"{side}_duty_pct", np.zeros_like(reading.columns["t_s"]))
-        unit, reason = encoder_unit(reading.columns["t_s"], reading.columns[column], duty)
+        unit, reason = encoder_unit(reading.columns["t_s"], reading.columns[column], duty, expected_dps)
         if unit is None or (meaning.said and meaning.unit):
             unit = meaning.unit or "deg"
         reading.convert(column, unit, reason)
@@ -207,7 +223,7 @@ def _read_pose(reading: _Reading) -> None:
     if "x_m" in columns and "y_m" in columns:
         lost, repairs = lost_poses(reading.name, columns["t_s"], columns["x_m"], columns["y_m"])
         reading.repairs += repairs
-        for column in ("x_m", "y_m", "heading_deg"):
+        for column in POSE:
             if column in columns:
                 columns[column][lost] = np.nan
         unit = reading.named_or("x_m", length_unit(columns["x_m"], columns["y_m"]))

@@ -15,6 +15,7 @@ from gecar.reality.importing.foreign import read_foreign
 from gecar.reality.importing.frame import Frame
 from gecar.reality.importing.join import join
 from gecar.reality.importing.log import DUTIES, Log, understand
+from gecar.reality.importing.meaning import Said
 from gecar.reality.recording import Recording, make_recording
 from gecar.reality.setup import Setup
 from gecar.world.robot import Robot
@@ -40,7 +41,7 @@ class ImportOptions:
         What to add to the camera's times [s].
     """
 
-    said: Mapping[str, tuple[str | None, str | None]] = field(default_factory=dict)
+    said: Mapping[str, Said] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     run: int | None = None
     constant: Mapping[str, float] = field(default_factory=dict)
@@ -89,7 +90,8 @@ def import_logs(paths: Sequence[Path], robot: Robot, setup: Setup, options: Impo
     InputError
         If a file is no log, or damaged beyond safe repair, or the clocks can not be aligned.
     """
-    logs = [understand(read_foreign(path, options.names, options.run), options.said) for path in paths]
+    tables = [read_foreign(path, options.names, options.run) for path in paths]
+    logs = [understand(table, options.said, _expected_dps(robot)) for table in tables]
     brick, camera = _roles(logs, options.constant)
     joining = join(brick, camera, robot, options.frame, options.offset_s)
     repairs = [line for log in logs for line in log.repairs] + joining.lines
@@ -98,6 +100,16 @@ def import_logs(paths: Sequence[Path], robot: Robot, setup: Setup, options: Impo
     return Imported(
         recording, tuple(line for log in logs for line in log.guesses), tuple(repairs), joining.offset
     )
+
+
+def _expected_dps(robot: Robot) -> float:
+    """Return how fast a robot's motors turn per percent of duty [deg/s]: a little below the no-load speed."""
+    free = (
+        robot.battery.voltage / 100.0 / robot.motor.back_emf_constant
+        if robot.motor.back_emf_constant
+        else np.inf
+    )
+    return 0.85 * float(np.rad2deg(free))
 
 
 def _roles(logs: Sequence[Log], constant: Mapping[str, float]) -> tuple[Log, Log | None]:

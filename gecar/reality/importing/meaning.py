@@ -193,7 +193,10 @@ class _Context:
     def guess(self, name: str, most: float) -> Said:
         """Return the recording's column that a name means, and the unit it names."""
         if name in COLUMNS:
-            return name, None
+            return (
+                name,
+                "deg" if name == "heading_deg" else None,
+            )  # the numbers of other columns tell their unit
         words = _words(name)
         column = self._column(set(words), self._side(words), most)
         if column is None:

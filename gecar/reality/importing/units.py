@@ -36,10 +36,6 @@ QUANTITY: Mapping[str, str] = MappingProxyType({
     "yaw_rate_dps": "rate",
 })  # fmt: skip
 
-# An EV3 large motor runs about 9 deg/s per percent of duty (facts of five motors: 6.7 to 12), whatever it
-# drives.
-_DPS_PER_PERCENT = 9.0
-
 
 def time_unit(time: Series, named: str | None) -> tuple[str, str]:
     """Return the unit of times, by their steps, and why.
@@ -77,13 +73,20 @@ def voltage_unit(values: Series) -> tuple[str, str]:
     return ("mv" if middle > 100.0 else "v"), f"around {middle:g}"
 
 
-def encoder_unit(t_s: Series, angle: Series, duty_pct: Series) -> tuple[str | None, str]:
+def encoder_unit(t_s: Series, angle: Series, duty_pct: Series, expected_dps: float) -> tuple[str | None, str]:
     """Return the unit of wheel angles, by how fast they turn at the duties given, and why.
+
+    Parameters
+    ----------
+    t_s, angle, duty_pct
+        Times [s], angles [any unit] and duties [%], shape (rows,).
+    expected_dps
+        Speed of the robot's motors per percent of duty [deg/s]; infinite if nothing limits it.
 
     Returns
     -------
     unit
-        ``None`` if the wheel hardly turned, or at no rate that an EV3 motor has in any unit.
+        ``None`` if the wheel hardly turned, or at no rate that such a motor has in any unit.
     reason
         In words.
     """
@@ -94,7 +97,7 @@ def encoder_unit(t_s: Series, angle: Series, duty_pct: Series) -> tuple[str | No
         return None, "no drive to tell by"
     rate = float(np.mean(speeds[driven]) / np.mean(np.abs(duty_pct[:-1][driven])))
     for unit, factor in UNITS["angle"].items():
-        if 1 / 2.4 < rate * factor / _DPS_PER_PERCENT < 2.4:
+        if 1 / 2.4 < rate * factor / expected_dps < 2.4:
             return unit, f"{rate:.2g} a second per percent of duty"
     return None, f"{rate:.2g} a second per percent of duty"
 
@@ -108,10 +111,5 @@ def length_unit(x: Series, y: Series) -> tuple[str, str]:
 
 def heading_unit(values: Series) -> tuple[str, str]:
     """Return the unit of headings, by their range, and why."""
-    seen = values[~np.isnan(values)]
-    most = float(np.max(np.abs(seen), initial=0.0))
-    steps = np.abs(np.diff(seen))
-    # A wrap is a step of nearly a full turn; unwrapped headings grow beyond one.
-    if most <= 2 * np.pi + 0.1 or bool(np.any(np.abs(steps - 2 * np.pi) < 0.3) and most < 60.0):
-        return "rad", f"at most {most:.3g}"
-    return "deg", f"at most {most:.3g}"
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    return ("rad" if most <= 2.0 * np.pi + 0.1 else "deg"), f"at most {most:.3g}"
