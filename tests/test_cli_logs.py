@@ -1,8 +1,8 @@
 """`gecar export` and `gecar import` as typed."""
 
 import pytest
+from foreign_logs import brick_log, camera_log
 from synthetic import drive
-from test_import import brick_log, camera_log
 
 PROGRAM = "if SensorValue > 80: motor(80,80,50)\nelse: motor(80,0,160)\n"
 
