@@ -81,6 +81,8 @@ def fastest_time(length_m: float, robot: Robot) -> float:
         run_up = v0 * reached - tau * fast.limit
         if length_m >= run_up:
             return reached + (length_m - run_up) / fast.limit
-    # s = v0 (t - tau + tau exp(-t / tau)), solved for t by Lambert's W.
+    # s = v0 (t - tau + tau exp(-t / tau)), solved for t by Lambert's W; at first s = v0 t^2 / (2 tau).
     x = length_m / (v0 * tau)
+    if x < 1e-8:
+        return tau * math.sqrt(2.0 * x)
     return tau * (1.0 + x + float(lambertw(-math.exp(-1.0 - x)).real))

@@ -79,7 +79,6 @@ def _must_pass(layout: Layout, start: int, end: int, avoid: int) -> list[int]:
     """Return the tiles every way from one tile to another passes, in order, both included.
 
     A tile of a shortest way can be avoided if some side way from an earlier tile comes back to a later one.
-    Corners that touch count as ways: the robot's centre may slip over such a point between two steps.
     """
     route = tile_route(layout, start, end, avoid)
     position = {tile: k for k, tile in enumerate(route)}
@@ -89,7 +88,7 @@ def _must_pass(layout: Layout, start: int, end: int, avoid: int) -> list[int]:
             kept.append(tile)
         waiting = [tile]
         while waiting:
-            for beyond in _touching(layout, waiting.pop()):
+            for beyond in _beyond(layout, waiting.pop(), avoid):
                 if beyond in position:
                     farthest = max(farthest, position[beyond])
                 elif beyond not in seen and beyond != avoid:
@@ -98,10 +97,21 @@ def _must_pass(layout: Layout, start: int, end: int, avoid: int) -> list[int]:
     return kept
 
 
-def _touching(layout: Layout, index: int) -> list[int]:
+def _beyond(layout: Layout, index: int, avoid: int) -> list[int]:
+    """Return the tiles a robot can get to from one: its neighbours, and some that touch it at a corner.
+
+    Between two steps the robot's centre may slip over the point where two tiles touch. If a third tile they
+    share can be driven on, that point is its corner as well, and the way counts as one through it.
+    """
+    beside = layout.drivable_neighbours(index)
     column, row = layout.place(index)
-    around = (layout.index(column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
-    return [n for n in around if n >= 0 and layout.drivable[n]]
+    corners = []
+    for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        across = layout.index(column + i, row + j)
+        shared = {layout.index(column + i, row), layout.index(column, row + j)} - {avoid}
+        if across >= 0 and layout.drivable[across] and not shared & set(beside):
+            corners.append(across)
+    return beside + corners
 
 
 def _parts(layout: Layout, chain: list[int]) -> list[list[int]]:
