@@ -9,20 +9,18 @@ from command import ROOT, start
 from gecar.cli.application import SEATS
 
 
-def test_help_names_every_command_and_is_fast():
+def test_help_names_every_command_and_imports_nothing_heavy():
     code = (
-        "import sys, time; begin = time.perf_counter(); sys.argv = ['gecar', '--help']\n"
+        "import sys; sys.argv = ['gecar', '--help']\n"
         "from gecar.__main__ import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"
-        "print(time.perf_counter() - begin, [m for m in ('numba', 'numpy', 'matplotlib') if m in sys.modules])"
+        "print([m for m in ('numba', 'numpy', 'matplotlib') if m in sys.modules])"
     )
     said = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     ).stdout
-    taken, imported = said.splitlines()[-1].split(" ", 1)
-    assert imported == "[]"
-    assert float(taken) < 0.6
+    assert said.splitlines()[-1] == "[]"
     assert all(seat.name in said for seat in SEATS if seat.exists)
 
 
