@@ -46,7 +46,7 @@ class SimulatedBrick:
         self.arrival_s = None
         self.visited = 0
         self.screen, self.screens, self.printed = [], [], []
-        self.answered = True
+        self.cleared_ms = 0.0
         self.files = {}
         self.storage = bytearray(512)
         self.duties = {}
@@ -127,14 +127,12 @@ class SimulatedBrick:
             driven_ms = 0.0 if self.start_ms is None else self.now_ms - self.start_ms
             late = self.pressed_after_ms is not None and driven_ms >= self.pressed_after_ms
             return ["CENTER"] if self.arrival_s is not None or late else []
-        if self.answered or not any("CENTER" in line for line in self.screen):
-            return []
-        self.answered = True
-        return ["CENTER"]
+        pressing = 300.0 <= self.now_ms - self.cleared_ms < 400.0
+        return ["CENTER"] if pressing and any("CENTER" in line for line in self.screen) else []
 
     def on_clear(self):
         self.screen = []
-        self.answered = False
+        self.cleared_ms = self.now_ms
 
     def on_show(self, line):
         self.screen.append(line)

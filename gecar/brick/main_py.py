@@ -174,7 +174,9 @@ def say(*lines):
 
 
 def wait_for(*buttons):
-    """Wait until one of some buttons is pressed and let go, and return it."""
+    """Wait until one of some buttons is pressed and let go, and return it; one held from before does not count."""
+    while hub.buttons.pressed():
+        wait(10)
     while True:
         pressed = [button for button in buttons if button in hub.buttons.pressed()]
         if pressed:
