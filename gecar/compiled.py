@@ -11,6 +11,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,7 +46,19 @@ def _cache_folder() -> Path:
     return folder
 
 
-setattr(numba.config, "CACHE_DIR", str(_cache_folder()))  # noqa: B010 - numba declares its settings at run time
+CACHE = _cache_folder()
+setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares its settings at run time
+
+
+def is_cold() -> bool:
+    """Whether no command has compiled all it needs here yet."""
+    return not (CACHE / "complete").exists()
+
+
+def mark_warm() -> None:
+    """Remember that a command has compiled all it needs."""
+    with suppress(OSError):
+        (CACHE / "complete").touch()
 
 
 def compiled(function: F) -> F:

@@ -32,6 +32,16 @@ class Ended:
         return json.loads(self.out)
 
 
+def call(*words: object) -> int:
+    """Run a command, and return its exit code."""
+    with patch.object(sys, "argv", ["gecar", *map(str, words)]):
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
+
+
 class Command:
     """Runs commands in this process, which has compiled everything already."""
 
@@ -40,12 +50,7 @@ class Command:
 
     def __call__(self, *words: object) -> Ended:
         self.capsys.readouterr()
-        with patch.object(sys, "argv", ["gecar", *map(str, words)]):
-            try:
-                main()
-                code = 0
-            except SystemExit as end:
-                code = int(end.code or 0)
+        code = call(*words)
         said = self.capsys.readouterr()
         return Ended(code, said.out, said.err)
 

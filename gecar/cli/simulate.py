@@ -41,7 +41,10 @@ def simulate(
     robot: RobotOption = None,
     noise: NoiseOption = None,
     motor_noise: MotorNoiseOption = None,
-    seed: Annotated[int, typer.Option("--seed", help="Which noise.", rich_help_panel="World")] = 1,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", help="Which noise.", show_default="as in the run, or 1", rich_help_panel="World"),
+    ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
     out: Annotated[
@@ -78,25 +81,26 @@ def simulate(
       gecar simulate best.txt --course hairpin --animate drive.gif
       gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
     """
-    from gecar.cli.worlds import build_world, find_program
+    from gecar.cli.worlds import build_world, drive_seed, find_program
     from gecar.language.program import read_program
     from gecar.report.drive import drive_table, sentence_of, standing_of
     from gecar.world.rollout import simulate as run
 
     voice = Voice(as_json)
-    if not 0 <= seed <= LARGEST_SEED:
+    if seed is not None and not 0 <= seed <= LARGEST_SEED:
         raise expected("--seed", seed, f"a whole number from 0 to {LARGEST_SEED}")
     target = None if no_picture else (out or Path()) / (picture or Path("trajectory.png"))
     _check_pictures(target, colour, animate, pace)
     file, settings = find_program(program)
     world = build_world(settings, course, robot, noise, motor_noise, time_limit, engine)
     loaded = read_program(file)
-    drive = run(world, loaded.opcodes, seed, trace=True)
+    which = drive_seed(seed, settings, loaded)
+    drive = run(world, loaded.opcodes, which, trace=True)
     voice.say(sentence_of(drive), style="bold")
     voice.say(standing_of(world, drive))
     written = _draw(voice, world, loaded, drive, target, colour)
     written |= _film(voice, world, loaded, drive, animate, pace)
-    voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": seed, **written})
+    voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": which, **written})
 
 
 def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:

@@ -1,4 +1,4 @@
-"""From options to a robot on a course."""
+"""From options and runs' folders to programs, and robots on courses."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from gecar.errors import expected
+from gecar.language.program import Program
+from gecar.results.config import Config, configure, read_config
+from gecar.search.evolution import noise_seed
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World
+
+_OF_A_WORLD = ("course", "robot", "time_limit_s", "step_s", "engine", "noise", "motor_noise", "seed")
 
 
 def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
@@ -17,12 +22,28 @@ def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
     Raises
     ------
     InputError
-        If a folder holds no best.txt.
+        If a folder holds no best.txt, or its config.toml is wrong.
     """
     file = place / "best.txt" if place.is_dir() else place
     if place.is_dir() and not file.is_file():
         raise expected(place, "a folder without best.txt", "a program file or a run's folder")
-    return file, {}
+    beside = file.parent / "config.toml"
+    if file.name != "best.txt" or not beside.is_file():
+        return file, {}
+    config = read_run_config(file.parent)
+    return file, {name: getattr(config, name) for name in _OF_A_WORLD}
+
+
+def read_run_config(folder: Path) -> Config:
+    """Read the configuration a run's folder holds.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is wrong.
+    """
+    place = folder / "config.toml"
+    return configure(read_config(place), place)
 
 
 def build_world(
@@ -41,14 +62,23 @@ def build_world(
     InputError
         If there is no such course or robot, or a number is out of range.
     """
+    plain = Config()
 
-    def chosen(given: Any, name: str, otherwise: Any) -> Any:
-        return settings.get(name, otherwise) if given is None else given
+    def chosen(given: Any, name: str) -> Any:
+        return settings.get(name, getattr(plain, name)) if given is None else given
 
     return World(
-        load_robot(chosen(robot, "robot", "ev3")),
-        load_course(chosen(course, "course", "paper")),
-        time_limit_s=chosen(time_limit_s, "time_limit_s", 60.0),
-        noise=Noise(chosen(noise_pct, "noise", 0.0), 0.01 * chosen(motor_noise_pct, "motor_noise", 0.0)),
-        engine=chosen(engine, "engine", "auto"),
+        load_robot(chosen(robot, "robot")),
+        load_course(chosen(course, "course")),
+        chosen(None, "step_s"),
+        chosen(time_limit_s, "time_limit_s"),
+        Noise(chosen(noise_pct, "noise"), 0.01 * chosen(motor_noise_pct, "motor_noise")),
+        chosen(engine, "engine"),
     )
+
+
+def drive_seed(given: int | None, settings: dict[str, Any], program: Program) -> int:
+    """Return the seed of a drive's noise: as given, or as the run scored the program, or 1."""
+    if given is not None:
+        return given
+    return noise_seed(settings["seed"], program) if settings else 1

@@ -26,6 +26,7 @@ from gecar.plots.style import (
     new_figure,
 )
 
+_VEIL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 UNSOLVED = 1e4
 """Fitness of a program that does not reach GOAL, eq. 1."""
 
@@ -65,7 +66,11 @@ def convergence(
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
         draw_best(top, generation, best, references)
         if "mean_solved" in history:
-            _draw_mean_solved(top, generation, history["mean_solved"])
+            top.plot(
+                generation, history["mean_solved"], color=ORANGE, linewidth=1.2, label="mean of those at GOAL"
+            )
+        if (best < UNSOLVED).any():
+            top.legend(loc="upper right")
         _draw_mean(middle, generation, history["mean"])
         _draw_shares(bottom, history)
         bottom.set_xlabel("generation")
@@ -79,7 +84,7 @@ def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence
     solved = best < UNSOLVED
     times = np.where(solved, best, np.nan)
     draw_references(axes, references)
-    axes.step(generation, times, where="post", color=BLUE, linewidth=2.2, zorder=3)
+    axes.step(generation, times, where="post", color=BLUE, linewidth=2.2, zorder=3, label="best")
     axes.plot(generation[solved], best[solved], "o", color=BLUE, markersize=3, zorder=3)
     axes.set_ylabel("best time to GOAL [s]")
     _frame(axes, best[solved], references)
@@ -90,22 +95,13 @@ def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence
         axes.annotate(
             last,
             (generation[-1], best[-1]),
-            (-4, 9),
+            (-4, -14),
             textcoords="offset points",
             ha="right",
             weight="bold",
             color=BLUE,
+            bbox=_VEIL,
         )
-
-
-def _draw_mean_solved(axes: Axes, generation: Series, mean: Series) -> None:
-    """Draw the mean time of programs at GOAL, as far as the picture of the best reaches."""
-    axes.plot(generation, mean, color=ORANGE, linewidth=1.2, zorder=2.5)
-    last = len(mean) - 1
-    if np.isfinite(mean[last]) and mean[last] < axes.get_ylim()[1]:
-        words = "mean of those at GOAL"
-        axes.annotate(words, (generation[last], mean[last]), (-4, 4), textcoords="offset points", ha="right", size=8,
-                      color=ORANGE)  # fmt: skip
 
 
 def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
@@ -147,7 +143,7 @@ def draw_references(axes: Axes, references: Sequence[Reference], side: float = 1
             ha="right" if side else "left",
             size=8,
             color=colour,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+            bbox=_VEIL,
         )
 
 

@@ -1,0 +1,104 @@
+"""A run's pictures, drawn from its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gecar.cli.voice import Voice
+from gecar.cli.worlds import build_world, drive_seed, find_program, read_run_config
+from gecar.language.program import read_program
+from gecar.plots.compare_runs import compare_runs
+from gecar.plots.convergence import Reference, convergence
+from gecar.plots.style import save
+from gecar.plots.trajectory import trajectory
+from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
+from gecar.report.run import run_detail, run_title
+from gecar.report.runs import group_names, summaries, summary_table
+from gecar.results.config import Config
+from gecar.results.folder import read_history, read_result
+from gecar.world.course import load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import simulate
+
+
+def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
+    """Draw a run's convergence and its best program's drive.
+
+    Parameters
+    ----------
+    folder
+        The run's.
+    out
+        Where the pictures go; by default into the run's folder.
+
+    Returns
+    -------
+    list
+        What was drawn; no drive where no genome mapped to a program.
+
+    Raises
+    ------
+    InputError
+        If the folder is no finished run's, or what it names can not be loaded.
+    """
+    target = out or folder
+    target.mkdir(parents=True, exist_ok=True)
+    drawn = [draw_convergence(folder, target / "convergence.png")]
+    if read_result(folder)["program"]:
+        drawn.append(draw_trajectory(folder, target / "trajectory.png"))
+    return drawn
+
+
+def draw_convergence(folder: Path, target: Path) -> Path:
+    """Draw a run's convergence."""
+    config, history, result = read_run_config(folder), read_history(folder), read_result(folder)
+    title, detail = run_title(config, result), run_detail(config, result)
+    return save(convergence(history, references(config), title, detail), target)
+
+
+def draw_trajectory(folder: Path, target: Path) -> Path:
+    """Draw the drive of a run's best program, as the run scored it."""
+    file, settings = find_program(folder)
+    world, program = build_world(settings), read_program(file)
+    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+    title, detail = title_of(drive, world.course), detail_of(world, drive)
+    return save(trajectory(world, program, drive, title=title, detail=detail), target)
+
+
+def references(config: Config) -> Sequence[Reference]:
+    """Return the times a run's best is compared with."""
+    bound = load_course(config.course).lower_bound_s(load_robot(config.robot))
+    paper = [Reference("the paper's best", PAPER_BEST_S)] if config.course == "paper" else []
+    return [*paper, Reference("lower bound", bound)]
+
+
+def compare(voice: Voice, folders: Sequence[Path], out: Path) -> tuple[dict[str, Any], list[Path]]:
+    """Draw runs beside each other, and print what each kind of run came to.
+
+    Returns
+    -------
+    tuple
+        (figures of each group, pictures drawn).
+
+    Raises
+    ------
+    InputError
+        If a folder is no finished run's.
+    """
+    configs = [read_run_config(folder) for folder in folders]
+    results, names = [read_result(folder) for folder in folders], group_names(configs)
+    histories = [read_history(folder) for folder in folders]
+    groups = {
+        name: [h for n, h in zip(names, histories, strict=True) if n == name] for name in dict.fromkeys(names)
+    }
+    table = summaries(names, results)
+    voice.say(summary_table(table))
+    same_course = len({(config.course, config.robot) for config in configs}) == 1
+    title = f"{len(folders)} runs" + (f" on {configs[0].course}" if same_course else "")
+    out.mkdir(parents=True, exist_ok=True)
+    figure = compare_runs(
+        groups, references(configs[0]) if same_course else (), title, "median and middle half of runs"
+    )
+    return table, [save(figure, out / "compare.png")]

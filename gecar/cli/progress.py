@@ -1,0 +1,80 @@
+"""How a run goes, while it goes: one live line on a terminal, a plain line now and then elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from gecar.search.fitness import UNSOLVED
+from gecar.search.history import Generation, pace
+
+PLAIN_EVERY_S = 5.0
+
+
+class Watch:
+    """Shows a run's generations on stderr as they come.
+
+    Parameters
+    ----------
+    history
+        The run's; it grows while the run goes on.
+    generations
+        Number of the last generation.
+    quiet
+        Whether to show nothing.
+    """
+
+    def __init__(self, history: Sequence[Generation], generations: int, quiet: bool = False) -> None:
+        self.history, self.generations, self.quiet = history, generations, quiet
+        console = Console(stderr=True, highlight=False)
+        self.console = console
+        self.live = None
+        self._said = time.monotonic()
+        if console.is_terminal and not quiet:
+            columns = (BarColumn(bar_width=16), TextColumn("{task.description}"))
+            self.live = Progress(*columns, console=console, transient=True)
+            self.task = self.live.add_task("starting ...", total=generations + 1)
+
+    def __enter__(self) -> Self:
+        if self.live:
+            self.live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.live:
+            self.live.stop()
+
+    def __call__(self, generation: Generation) -> None:
+        """Show a generation that has just been scored."""
+        if self.live:
+            words = line(self.history, self.generations)
+            self.live.update(self.task, completed=generation.generation + 1, description=words)
+        elif not self.quiet and time.monotonic() - self._said > PLAIN_EVERY_S:
+            self._said = time.monotonic()
+            self.console.print(line(self.history, self.generations), soft_wrap=True)
+
+
+def line(history: Sequence[Generation], generations: int) -> str:
+    """Put a run's state in one line.
+
+    Parameters
+    ----------
+    history
+        All generations so far, at least one.
+    generations
+        Number of the last.
+    """
+    last, speed = history[-1], pace(history, generations)
+    best = f"best {last.best:.2f} s" if last.best < UNSOLVED else "nobody at GOAL"
+    left = round(speed.left_s)
+    return (
+        f"{last.generation}/{generations}  {best}  mean {last.mean:.0f}  valid {100 * last.valid:.0f} %  "
+        f"distinct {100 * last.distinct:.0f} %  {speed.evaluations_per_s:,.0f}/s  {left // 60}:{left % 60:02d} left"
+    )

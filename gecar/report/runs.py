@@ -1,0 +1,75 @@
+"""Several runs in words: what they share, and what each kind came to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from gecar.results.config import Config
+
+_NAMES = {"crossover_rate": "crossover", "mutation_rate": "mutation"}
+
+
+def group_names(configs: Sequence[Config]) -> list[str]:
+    """Name each run by what sets it apart from the others, seeds aside; runs that differ in seed only share a name."""
+    flat = [_flat(config) for config in configs]
+    apart = [key for key in flat[0] if len({str(each[key]) for each in flat}) > 1]
+    if "preset" in apart:  # it says what the search settings are, where they are the preset's own
+        apart = ["preset", *(key for key in apart if key in _flat_world(configs[0]))]
+        apart += [key for key in flat[0] if key not in apart and _varies_within(flat, apart, key)]
+    if not apart:
+        return [f"preset {config.preset}" for config in configs]
+    return [", ".join(f"{_NAMES.get(key, key)} {each[key]}" for key in apart) for each in flat]
+
+
+def _flat(config: Config) -> dict[str, Any]:
+    return {"preset": config.preset, **_flat_world(config), **config.identity["search"]}
+
+
+def _flat_world(config: Config) -> dict[str, Any]:
+    return {name: value for name, value in config.identity.items() if name not in ("search", "seed")}
+
+
+def _varies_within(flat: Sequence[Mapping[str, Any]], apart: Sequence[str], key: str) -> bool:
+    """Whether runs that agree in the keys so far still differ in another."""
+    seen: dict[tuple[str, ...], str] = {}
+    return any(
+        seen.setdefault(tuple(str(each[k]) for k in apart), str(each[key])) != str(each[key]) for each in flat
+    )
+
+
+def summaries(names: Sequence[str], results: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Sum up each group of runs: how many, how many solved, and the times of those."""
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for name, result in zip(names, results, strict=True):
+        groups.setdefault(name, []).append(result)
+    return {name: _summary(group) for name, group in groups.items()}
+
+
+def _summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    times = np.array([result["fitness_s"] if result["solved"] else np.inf for result in results])
+    solved = times[np.isfinite(times)]
+    return {
+        "runs": len(times),
+        "solved": len(solved),
+        "best_s": float(times.min()),
+        "median_s": float(np.quantile(times, 0.5, method="higher")),
+        "worst_s": float(times.max()),
+        "mean_solved_s": float(solved.mean()) if len(solved) else float("nan"),
+        "evaluations": int(np.median([result["evaluations"] for result in results])),
+    }
+
+
+def summary_table(groups: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Return groups of runs as a table for people."""
+    table = Table("", "runs", "solved", "best", "median", "worst", "evaluations", box=None, pad_edge=False)
+    for name, group in groups.items():
+        times = (
+            f"{group[key]:.2f} s" if np.isfinite(group[key]) else "no GOAL"
+            for key in ("best_s", "median_s", "worst_s")
+        )
+        table.add_row(name, str(group["runs"]), str(group["solved"]), *times, f"{group['evaluations']:,}")
+    return table
