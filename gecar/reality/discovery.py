@@ -1,0 +1,253 @@
+"""Discover: from a case's recordings to a verdict on what the simulation lacks.
+
+verdict = discover(read_case("recordings/monday"))
+print(verdict)
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.chain import Explanation, explain
+from gecar.reality.comparison import Comparison, Strip
+from gecar.reality.confusion import alternatives
+from gecar.reality.fitting import cost
+from gecar.reality.freedom import free
+from gecar.reality.holdout import Split, judge, split
+from gecar.reality.location import Map
+from gecar.reality.next_recording import suggest
+from gecar.reality.noise import Noise, estimate_noise
+from gecar.reality.recording import Case, Recording
+from gecar.reality.selection import Selection
+from gecar.reality.uncertainty import intervals
+from gecar.reality.verdict import Found, Judgement, Place, Residual, Verdict
+from gecar.reality.whiteness import whiteness
+from gecar.world.course import Course, load_course
+from gecar.world.effects import CATALOGUE
+from gecar.world.robot import Robot, load_robot
+
+Array = npt.NDArray[np.float64]
+
+MEMORY_S = 1.0
+SIGHT = ("sensor_lag", "sensor_delay", "sensor_gain", "sensor_position", "spot_size", "line_shift")
+_MOTION = tuple(e.id for e in CATALOGUE if e.id not in SIGHT)
+# What a bench can not show: nothing touches the floor, and no camera looks.
+_FLOOR_ONLY = frozenset(
+    [
+        "wheel_radius",
+        "wheel_radius_difference",
+        "track_width",
+        "tyre_friction",
+        "slippery_patch",
+        "caster_drag",
+        "rolling_resistance",
+        "floor_tilt",
+        "load_transfer",
+        "com_offset",
+        "backlash",
+        "pose_delay",
+    ]
+)
+_TWO_MOTORS = frozenset({"motor_gain_asymmetry"})
+
+
+@dataclass
+class _Workshop:
+    """What all stages of one discovery share."""
+
+    robot: Robot
+    split: Split
+    noise: Noise
+    strips: list[Strip]
+    held: list[Strip]
+    pool: ThreadPoolExecutor
+    tell: Callable[[str], None]
+    seed: int
+
+
+def discover(
+    case: Case,
+    holdout: Sequence[str] = (),
+    robot: Robot | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+) -> Verdict:
+    """Find which physics a simulation lacks, fit it, and prove it on recordings set aside.
+
+    Parameters
+    ----------
+    case
+        Recordings of one robot.
+    holdout
+        Names of the recordings to set aside; default: every fourth, or the last part of the only one.
+    robot
+        The robot as it is known; default: what the recordings name.
+    seed
+        Of every draw of chance.
+    workers
+        Threads; default: all cores.
+    tell
+        Called with a line of progress.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or a robot or course file is wrong.
+    """
+    shop = _open(case, holdout, robot, seed, workers, tell)
+    tell(f"fitting on {', '.join(r.name for r in shop.split.fitted)}")
+    motion = Selection(
+        Comparison(shop.strips, False, shop.pool), shop.robot, _seen(shop), shop.split.fitted, seed, tell
+    )
+    moved = explain(motion)
+    sight, seen = _look(shop, moved)
+    found_robot = shop.robot.with_effects({**moved.taken.values, **(seen.taken.values if seen else {})})
+    tell("intervals, alternatives, whereabouts")
+    judgement = _judge(shop, found_robot)
+    found = _found(shop, motion, moved, found_robot) + (
+        _found(shop, sight, seen, found_robot) if sight and seen else ()
+    )
+    located = _locate(shop, motion, sight)
+    unexplained = moved.unexplained or bool(seen and seen.unexplained)
+    verdict = (
+        ("missing_and_unexplained" if found else "unexplained")
+        if unexplained
+        else ("missing" if found else "nothing")
+    )
+    white, p = whiteness(motion, moved.taken)
+    return Verdict(
+        case=case.name,
+        verdict=verdict,
+        effects=found,
+        located=located,
+        judgement=judgement,
+        residual=Residual(white and not unexplained, p, None),
+        next_recording=suggest(shop.robot, moved.taken, motion, found, shop.noise, unexplained),
+        robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
+        fitted_on=tuple(r.name for r in shop.split.fitted),
+        notes=_notes(shop, motion),
+    )
+
+
+def _open(
+    case: Case,
+    holdout: Sequence[str],
+    robot: Robot | None,
+    seed: int,
+    workers: int | None,
+    tell: Callable[[str], None],
+) -> _Workshop:
+    parts = split(case, holdout)
+    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
+    noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
+    courses: dict[str, Course | None] = {}
+
+    def strip(recording: Recording) -> Strip:
+        name = recording.setup.course
+        if name not in courses:
+            needed = recording.setup.rig == "floor" and name != "none"
+            courses[name] = load_course(name) if needed else None
+        return Strip(recording, noise, MEMORY_S, courses[name])
+
+    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    return _Workshop(
+        known,
+        parts,
+        noise,
+        [strip(r) for r in parts.fitted],
+        [strip(r) for r in parts.held],
+        pool,
+        tell,
+        seed,
+    )
+
+
+def _seen(shop: _Workshop) -> tuple[str, ...]:
+    """Return the effects of motion these recordings can show at all."""
+    fitted = shop.split.fitted
+    hidden: set[str] = set()
+    if all(r.setup.rig == "bench" for r in fitted):
+        hidden |= _FLOOR_ONLY
+    if all(np.isnan(r.left_duty).all() or np.isnan(r.right_duty).all() for r in fitted):
+        hidden |= _TWO_MOTORS
+    if not any(len(s.film.reel.pose_t) for s in shop.strips):
+        hidden |= {"pose_delay", "slippery_patch"}
+    return tuple(e for e in _MOTION if e not in hidden)
+
+
+def _look(shop: _Workshop, moved: Explanation) -> tuple[Selection | None, Explanation | None]:
+    """Explain what the colour sensor saw along the measured path."""
+    comparison = Comparison(shop.strips, True, shop.pool)
+    if not comparison.strips:
+        return None, None
+    comparison.set_path(moved.taken.freedom.physics(moved.taken.fit.z))
+    selection = Selection(comparison, shop.robot, SIGHT, shop.split.fitted, shop.seed, shop.tell)
+    return selection, explain(selection)
+
+
+def _judge(shop: _Workshop, found: Robot) -> Judgement:
+    sight = Comparison(shop.held, True, shop.pool)
+    sight.set_path(found.physics)
+    channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
+    return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
+
+
+def _found(shop: _Workshop, selection: Selection, explained: Explanation, robot: Robot) -> tuple[Found, ...]:
+    taken = explained.taken
+    if not taken.effects:
+        return ()
+    spans = intervals(selection, taken)
+    held = Comparison(shop.held, selection.comparison.sight, shop.pool)
+    with_all = cost(held.errors(robot.physics)) if held.strips else 0.0
+    out = []
+    for step in explained.steps:
+        rest = robot.model_copy(
+            update={"effects": {k: v for k, v in robot.effects.items() if k != step.effect}}
+        )
+        gain = cost(held.errors(rest.physics)) - with_all if held.strips else float("nan")
+        out.append(
+            Found(
+                step.effect,
+                alternatives(selection, explained, step),
+                spans[step.effect],
+                gain,
+                step.null_95,
+                step.p,
+            )
+        )
+    return tuple(out)
+
+
+def _locate(shop: _Workshop, motion: Selection, sight: Selection | None) -> tuple[Place, ...]:
+    parts = [(motion.bare.fit.errors, motion.cells)]
+    if sight is not None:
+        where = np.array([shop.strips.index(s) for s in sight.comparison.strips], np.int32)
+        parts.append((sight.bare.fit.errors, replace(sight.cells, recording=where[sight.cells.recording])))
+    return Map(shop.strips, parts, shop.robot.physics).places(np.random.default_rng(shop.seed))
+
+
+def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:
+    notes = []
+    if shop.split.by_time:
+        notes.append(
+            "Only one recording: its last part was set aside, so the proof is by time, not by another run."
+        )
+    if motion.clocked:
+        late = ", ".join(f"{1e3 * o:.0f}" for o in motion.comparison.offsets)
+        notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
+    measured = {name for r in shop.split.fitted for name in r.measured}
+    if not {"x_m", "heading_rad"} & measured:
+        notes.append("No pose was recorded: what only a camera sees was not looked for.")
+    return tuple(notes)
+
+
+def nominal_freedom(robot: Robot) -> Array:
+    """Return the empty vector of a robot with nothing freed, shape (0,)."""
+    return np.zeros(free(robot, ()).size)

@@ -1,0 +1,115 @@
+"""Where identification starts looking for an effect: values of its parameters worth a try.
+
+Most effects are found from a few sizes on both sides of neutral. Some have a landscape with many valleys, and are
+scanned: a slippery patch by place, a ripple by its cycles, a dead band by its edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.freedom import Coordinate, free
+from gecar.reality.recording import Recording
+from gecar.world.effects import BY_ID
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Values = Mapping[str, float]
+
+_SIZES = (3.0, 12.0)  # in steps worth a name
+
+
+def starts(effect_id: str, robot: Robot, recordings: Sequence[Recording]) -> list[Values]:
+    """Return values of an effect's parameters to start from, by label."""
+    special = _SPECIAL.get(effect_id)
+    if special is not None:
+        return list(special(robot, recordings))
+    return list(_both_sides(effect_id, robot))
+
+
+def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
+    for c in free(robot, [effect_id]).coordinates:
+        for value in _sizes(c):
+            yield {c.parameter.label: value}
+
+
+def _sizes(c: Coordinate) -> Iterator[float]:
+    if c.parameter.worthwhile <= 0.0:
+        return
+    for z in _SIZES:
+        for side in (z, -z):
+            if c.parameter.low <= c.neutral + side * c.step <= c.parameter.high:
+                yield c.value(side)
+
+
+def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    for speed in (0.3, 1.0, 3.0):
+        for torque in (0.01, 0.03):
+            yield {"extra_torque_nm": torque * _torque_scale(robot), "speed_rad_s": speed}
+
+
+def _torque_scale(robot: Robot) -> float:
+    """Return how much stronger the robot's motors are than an EV3's, by stall torque."""
+    m = robot.motor
+    return m.torque_constant * robot.battery.voltage / m.resistance / 0.433
+
+
+def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    for duty in (2.0, 5.0, 10.0, 15.0, 20.0):
+        yield {"duty_pct": duty, "offset_share": 1.0}
+    levels = np.unique(np.abs(np.concatenate([r.commands.ravel() for r in recordings]))) * 100.0
+    edges = (levels[1:] + levels[:-1]) / 2.0
+    edges = edges[(edges > 1.0) & (edges < 40.0)]
+    for edge in edges[np.unique(np.linspace(0, len(edges) - 1, 12).astype(int))] if len(edges) else ():
+        yield {"duty_pct": float(edge), "offset_share": 0.0}
+
+
+def _ripple(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    size = 0.01 * _torque_scale(robot)
+    for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
+        for phase in (-0.75 * math.pi, -0.25 * math.pi, 0.25 * math.pi, 0.75 * math.pi):
+            yield {"amplitude_nm": size, "cycles_per_rev": float(cycles), "phase_rad": phase}
+
+
+def _patch(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    """Scan the floor where the robot has been, on a grid a patch can not slip through."""
+    places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
+    if not len(places):
+        return
+    cells = np.unique(np.round(places / 0.15).astype(int), axis=0) * 0.15
+    for x, y in cells[np.unique(np.linspace(0, len(cells) - 1, 60).astype(int))]:
+        yield {"radius_m": 0.15, "x_m": float(x), "y_m": float(y), "coefficient": 0.15}
+
+
+def _speed_limit(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    top = robot.battery.voltage / max(robot.motor.back_emf_constant, 1e-3) * robot.drive.duty_cap
+    for share in (0.92, 0.8, 0.65, 0.5):
+        yield {"speed_rad_s": max(share * top, BY_ID["speed_limit"].parameters[0].low)}
+
+
+def _slew(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    for rate in (1500.0, 600.0, 250.0, 100.0):
+        yield {"rate_pct_s": rate}
+
+
+def _positive(*labels_sizes: tuple[str, tuple[float, ...]]) -> list[Values]:
+    return [{label: size} for label, sizes in labels_sizes for size in sizes]
+
+
+_SPECIAL = {
+    "static_friction": _static,
+    "dead_band": _dead_band,
+    "torque_ripple": _ripple,
+    "slippery_patch": _patch,
+    "speed_limit": _speed_limit,
+    "command_slew": _slew,
+    "backlash": lambda robot, recordings: _positive(("angle_deg", (2.0, 5.0, 10.0))),  # noqa: ARG005
+    "actuation_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.03, 0.08))),  # noqa: ARG005
+    "tyre_friction": lambda robot, recordings: _positive(("coefficient", (0.6, 0.35, 0.15, 1.2))),  # noqa: ARG005
+    "sensor_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
+    "sensor_lag": lambda robot, recordings: _positive(("time_constant_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
+}

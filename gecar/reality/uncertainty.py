@@ -1,0 +1,58 @@
+"""Intervals: what other recordings, other noise, and the simulation's own faults would have made of a parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting import weights
+from gecar.reality.selection import Model, Selection
+from gecar.reality.verdict import Interval
+
+Array = npt.NDArray[np.float64]
+
+NORMAL_95 = 1.96
+SYSTEMATIC = 0.02  # of an effect's size: against the 3D engine, fitted parameters come back within so much
+SYSTEMATIC_STEP = 0.15  # of the smallest size worth a name
+
+
+def deviations(selection: Selection, model: Model) -> Array:
+    """Return standard deviations of a model's coordinates, shape (k,).
+
+    The larger of two: a sandwich over half-second spans, which holds whatever the noise's colour, and the jackknife over
+    recordings, which also feels what no noise model knows.
+    """
+    slopes, errors = selection.slopes(model), model.fit.errors
+    w = weights(errors)
+    normal = slopes.T @ (w[:, None] * slopes)
+    inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
+    scores = np.stack([np.bincount(selection.spans, s * w * errors) for s in slopes.T], axis=1)
+    sandwich = inverse @ (scores.T @ scores) @ inverse
+    leaps = []
+    for k in np.unique(selection.folds):
+        rows = selection.folds == k
+        part = slopes[rows].T @ (w[rows, None] * slopes[rows])
+        leaps.append(
+            np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
+        )
+    folds = len(leaps)
+    jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
+    out: Array = np.sqrt(np.maximum(np.diag(sandwich), jack))
+    return out
+
+
+def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interval]]:
+    """Return 95 % intervals of every parameter of a model, by effect and label."""
+    if not model.effects:
+        return {}
+    out: dict[str, dict[str, Interval]] = {}
+    low, high = model.freedom.bounds
+    for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
+        z = float(model.fit.z[k])
+        size = SYSTEMATIC * abs(z) + (SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0)
+        reach = NORMAL_95 * float(np.hypot(min(sd, 1e3), 0.5 * size))
+        ends = sorted(c.value(float(end)) for end in np.clip((z - reach, z + reach), low[k], high[k]))
+        out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(
+            c.value(z), ends[0], ends[1], c.parameter.unit
+        )
+    return out

@@ -1,0 +1,187 @@
+"""The verdict: what is missing, how sure that is, where it shows, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from gecar.reality.holdout import Misfit
+from gecar.world.robot import Robot
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A parameter's value and 95 % interval, in its unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    id
+        Its identifier.
+    alternatives
+        Effects these recordings can not tell from it.
+    parameters
+        By label.
+    holdout_gain
+        What it lowers the cost by on the recordings set aside.
+    null_95, p
+        95 % quantile of the largest gain without a cause, and the share of nulls that gain as much.
+    """
+
+    id: str
+    alternatives: tuple[str, ...]
+    parameters: Mapping[str, Interval]
+    holdout_gain: float
+    null_95: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where simulation and reality part.
+
+    Attributes
+    ----------
+    channel, regime
+        In which channel, in what motion.
+    share
+        Of the channel's excess energy.
+    p
+        From shifting the regime in time.
+    times_s
+        Spans [s] in the recording.
+    recording
+        The recording in which it shows most.
+    place
+        x, y [m] and radius [m] on the floor, or None.
+    """
+
+    channel: str
+    regime: str
+    share: float
+    p: float
+    times_s: tuple[tuple[float, float], ...]
+    recording: str
+    place: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the robot found is worth on the recordings set aside."""
+
+    recordings: tuple[str, ...]
+    by_time: bool
+    channels: Mapping[str, Misfit]
+
+    @property
+    def before(self) -> float:
+        """Mean NRMSE of the channels for the robot as it was."""
+        return _mean([m.before for m in self.channels.values()])
+
+    @property
+    def after(self) -> float:
+        """Mean NRMSE for the robot found."""
+        return _mean([m.after for m in self.channels.values()])
+
+    @property
+    def floor(self) -> float:
+        """Mean NRMSE that noise alone leaves."""
+        return _mean([m.floor for m in self.channels.values()])
+
+    @property
+    def gap_closed(self) -> float | None:
+        """Share of the gap to the floor that is closed; None where there is no gap to speak of."""
+        gap = self.before - self.floor
+        return (self.before - self.after) / gap if gap > 0.2 * self.floor else None
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left: whether it is white, how likely that is by chance, and a formula that describes it."""
+
+    white: bool
+    p: float
+    formula: str | None = None
+
+
+@dataclass(frozen=True)
+class NextRecording:
+    """The recording to make next: why, and its commands (time [s], left and right duty [%])."""
+
+    why: str
+    commands: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `gecar.reality.discovery.discover` found; print it, or plot it with `gecar.plots.discovery`."""
+
+    case: str
+    verdict: str
+    effects: tuple[Found, ...]
+    located: tuple[Place, ...]
+    judgement: Judgement
+    residual: Residual
+    next_recording: NextRecording
+    robot: Robot
+    fitted_on: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    evidence: Any = field(default=None, repr=False)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the contents of ``verdict.json``."""
+        judged = self.judgement
+        return {
+            "verdict": self.verdict,
+            "effects": [_effect_json(found) for found in self.effects],
+            "located": [_place_json(place) for place in self.located],
+            "holdout": {
+                "recordings": list(judged.recordings),
+                "channels": {c: vars(m) for c, m in judged.channels.items()},
+                "before": judged.before,
+                "after": judged.after,
+                "floor": judged.floor,
+                "gap_closed": judged.gap_closed,
+            },
+            "residual": vars(self.residual),
+            "next_recording": {
+                "why": self.next_recording.why,
+                "commands": [list(row) for row in self.next_recording.commands],
+            },
+        }
+
+
+def _effect_json(found: Found) -> dict[str, Any]:
+    return {
+        "id": found.id,
+        "or": list(found.alternatives),
+        "parameters": {label: vars(interval) for label, interval in found.parameters.items()},
+        "evidence": {"holdout_gain": found.holdout_gain, "null_95": found.null_95, "p": found.p},
+    }
+
+
+def _place_json(place: Place) -> dict[str, Any]:
+    spot = place.place
+    return {
+        "channel": place.channel,
+        "regime": place.regime,
+        "share": place.share,
+        "p": place.p,
+        "times_s": [list(span) for span in place.times_s],
+        "place": None if spot is None else {"x_m": spot[0], "y_m": spot[1], "radius_m": spot[2]},
+        "recording": place.recording,
+    }
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values) if values else 0.0
