@@ -232,15 +232,22 @@ def find_calibration():
 '''
 
 KEEP_IN_STORAGE = '''def keep_calibration():
+    """The brick saves it when it is turned off. One without storage asks again the next time."""
     numbers = [71, 67, len(calibration)]  # "GC": gecar's
     for white, black in calibration:
         numbers += [white, black]
-    hub.system.storage(0, write=bytes(numbers))
+    try:
+        hub.system.storage(0, write=bytes(numbers))
+    except (AttributeError, OSError, ValueError):
+        pass
 
 
 def find_calibration():
-    """Fetch the last calibration, if there is one for these sensors. The brick saves it when it is turned off."""
-    stored = hub.system.storage(0, read=3 + 2 * len(sensors))
+    """Fetch the last calibration, if there is one for these sensors."""
+    try:
+        stored = hub.system.storage(0, read=3 + 2 * len(sensors))
+    except (AttributeError, OSError, ValueError):
+        return
     pairs = [(stored[k], stored[k + 1]) for k in range(3, len(stored), 2)]
     if stored[:3] == bytes([71, 67, len(sensors)]) and all([pair[0] >= pair[1] + 10 for pair in pairs]):
         calibration.extend(pairs)
