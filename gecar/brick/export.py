@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gecar.brick import main_py
+from gecar.brick import keeping_py, main_py
 from gecar.brick.words import READERS, function_text
 from gecar.errors import expected
 from gecar.language.program import Program
@@ -109,7 +109,7 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
         main_py.TOP
         + function_text(program.statements)
         + main_py.DRIVING
-        + (main_py.KEEP_IN_FILE if second else main_py.KEEP_IN_STORAGE)
+        + (keeping_py.KEEP_IN_FILE if second else keeping_py.KEEP_IN_STORAGE)
         + main_py.RUN
     )
     words = (
