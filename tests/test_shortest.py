@@ -83,7 +83,7 @@ def walk(turns):
     return tiles
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 @given(
     st.lists(st.sampled_from([-1, 0, 1]), min_size=2, max_size=9),
     st.floats(4.05, 4.95),
