@@ -37,6 +37,9 @@ def test_print_writes_a_pdf(gecar, tmp_path):
         (("print", "paper", "--paper", "A9"), "A9"),
         (("print", "paper", "--out", "x.png"), "x.png"),
         (("new", "mine.txt"), "mine.txt"),
+        (("new", "mine.toml", "--size", "big"), "big"),
+        (("new", "mine.toml", "--size", "1x1"), "--size"),
+        (("new", "mine.toml", "--tile", "nan"), "nan"),
         (("list", "--robot", "nobody"), "nobody"),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_run_leaves_everything_in_its_folder(gecar, tmp_path):
     assert ended.json["folder"] == "runs/paper-paper-seed1"
     assert {path.name for path in folder.iterdir()} == FILES
     assert "The best program, found in generation" in ended.err
-    assert "gecar simulate runs/paper-paper-seed1" in ended.err
+    assert " simulate runs/paper-paper-seed1" in ended.err
     assert ended.json["verified_on_pymunk"]
     assert ended.json["evaluations"] == 60
     with Image.open(folder / "convergence.png") as picture:
@@ -87,9 +87,9 @@ def test_options_override_the_file_and_settings_have_names(gecar, tmp_path):
         "--generations",
         1,
         "--set",
-        "crossover=subtree",
+        "duplicates=generation",
         "--set",
-        "creep_rate=0.5",
+        "checkpoint_credit=true",
     )
     assert gecar(*words, "--workers", 1, "--out", "new", "--no-pictures").code == 0
     config = (tmp_path / "new/config.toml").read_text()
@@ -97,8 +97,8 @@ def test_options_override_the_file_and_settings_have_names(gecar, tmp_path):
         "seed = 3",
         "population = 10",
         "generations = 1",
-        'crossover = "subtree"',
-        "creep_rate = 0.5",
+        'duplicates = "generation"',
+        "checkpoint_credit = true",
     ):
         assert said in config
 

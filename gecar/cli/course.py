@@ -134,64 +134,30 @@ def print_out(
     voice.answer({"course": name, "file": str(target), "sheets": len(plan.sheets), "page_mm": plan.page})
 
 
-TEMPLATE = '''\
-# A course for gecar. Look at it with: gecar course show {file}
-# Tiles: - | straight   F 7 L J sharp corner   f ? l j curved corner   + crossing   = : gap   ~ u S Z zigzag
-#        . bare floor the robot may drive on   # not part of the course; gecar/world/tiles.py draws them all
-title = "{title}"
-tile_size_m = 0.30
-line_width_m = 0.025
-map = """
-f--?##
-|##l-?
-|####|
-L----J
-"""
-goal = [0, 1]         # column and row from the lower left tile, which is [0, 0]
-
-[start]
-tile = [0, 2]
-heading = "up"        # up, down, left, right, or degrees counter-clockwise from +x
-left_m = -0.025       # from the tile's middle, as seen from the robot
-
-# [[walls]]           # ends of a wall [m]
-# from_m = [0.5, 0.5]
-# to_m = [0.9, 0.5]
-
-# [[obstacles]]       # a box, or kind = "disc" with diameter_m
-# kind = "box"
-# at_m = [1.2, 0.15]
-# size_m = [0.1, 0.06]
-# mass_kg = 0.2
-'''
-
-
 @course.command()
 def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.toml.", show_default=False)
     ],
+    size: Annotated[str, typer.Option("--size", metavar="COLUMNSxROWS", help="How many tiles.")] = "8x4",
+    tile: Annotated[float, typer.Option("--tile", metavar="M", help="Edge of a tile, in metres.")] = 0.30,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a course file to begin with: a small loop, to be edited by hand.
+    """Write a course file to begin with: a loop with every field explained, to be edited by hand.
 
     [bold]Example[/]
 
-      gecar course new mine.toml && gecar course show mine.toml --picture mine.png
+      gecar course new mine.toml --size 6x4
     """
-    from gecar.files import write_whole
-    from gecar.world.course import parse_course
+    from gecar.calling import command
+    from gecar.world.course_new import new_course
 
     voice = Voice(as_json)
-    if file.suffix != ".toml":
-        raise expected("FILE", f"'{file}'", "a name that ends in .toml")
-    if file.exists():
-        raise expected(file, "a file that exists", "a new name")
-    text = TEMPLATE.format(file=file, title=file.stem.replace("_", " ").replace('"', "").replace("\\", ""))
-    parse_course(text, str(file))
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(file, text)
-    voice.say(f"Wrote {file}. Edit its map, then: gecar course show {file}")
+    columns, _, rows = size.lower().partition("x")
+    if not (columns.isdecimal() and rows.isdecimal()):
+        raise expected("--size", f"'{size}'", "tiles across x tiles up, as 8x4")
+    new_course(file, int(columns), int(rows), tile)
+    voice.say(f"Wrote {file}. Edit its map, then: {command()} course show {file} --picture {file.stem}.png")
     voice.answer({"file": str(file)})
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from gecar.calling import command
 from gecar.cli.pictures import draw_run
 from gecar.cli.progress import Watch
 from gecar.cli.voice import Voice
@@ -114,4 +115,4 @@ def _tell(voice: Voice, started: Started, result: dict[str, Any], pictures: list
     for picture in pictures:
         voice.say(f"Picture:  {picture}")
     if best.program is not None:
-        voice.say(f"Film it:  gecar simulate {folder} --animate drive.gif")
+        voice.say(f"Film it:  {command()} simulate {folder} --animate drive.gif")

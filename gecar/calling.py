@@ -1,0 +1,27 @@
+"""How gecar is called here, for words that tell what to type next."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+
+def command() -> str:
+    """Return what to type for ``gecar``: that word where the shell would find it, else this one's path or module."""
+    beside = Path(sys.executable).with_name("gecar")
+    found = shutil.which("gecar")
+    if found and Path(found).resolve() == beside.resolve():
+        return "gecar"
+    if beside.exists():
+        return _short(beside)
+    return f"{_short(Path(sys.executable))} -m gecar"
+
+
+def _short(path: Path) -> str:
+    """Return the shorter of a path's absolute and relative forms."""
+    try:
+        return min(str(path), os.path.relpath(path), key=len)
+    except ValueError:  # another drive
+        return str(path)
