@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -92,12 +93,18 @@ class Batches:
             self._executor = None
 
     def _cut(self, n: int) -> list[slice]:
-        """Cut n programs so that no worker waits long for another, and no batch is not worth sending."""
-        share_s = n * self._each_s / (4 * self.workers)
-        size = max(1, round(min(max(share_s, self._shortest_s), LONGEST_S) / self._each_s))
-        if self.workers == 1:
-            size = max(n, 1)
-        return [slice(begin, begin + size) for begin in range(0, max(n, 1), size)]
+        """Cut n programs: large batches first and small ones last, so that all workers finish together."""
+        if self.workers == 1 or n == 0:
+            return [slice(0, n)]
+        smallest = max(1, round(self._shortest_s / self._each_s))
+        largest = max(1, int(LONGEST_S / self._each_s))
+        pieces, begin = [], 0
+        while begin < n:
+            share = math.ceil((n - begin) / (1.5 * self.workers))
+            end = min(begin + min(max(share, smallest), largest), n)
+            pieces.append(slice(begin, end))
+            begin = end
+        return pieces
 
     def _run(self, batches: list[tuple[Sequence[Opcodes], Sequence[int]]]) -> list[Scored]:
         """Run the batches, those that were lost with their worker again; in the order given."""
