@@ -18,8 +18,18 @@ def shipped(folder: str) -> Path:
     return inside if inside.is_dir() else package.parent / folder
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes, durable: bool = True) -> None:
     """Write a file so that a reader, or a crash, sees either the old content or the new, never a part.
+
+    Parameters
+    ----------
+    path
+        The file.
+    content
+        All of it.
+    durable
+        Whether to wait until it would survive a power cut, which takes some milliseconds. Without, it still
+        survives the end of this process, however sudden.
 
     Raises
     ------
@@ -32,7 +42,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with os.fdopen(handle, "wb") as stream:
             stream.write(raw)
             stream.flush()
-            os.fsync(stream.fileno())
+            if durable:
+                os.fsync(stream.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except BaseException:

@@ -160,7 +160,7 @@ class Evolution:
             if phenotype is not None and phenotype.digest not in self._cache:
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
-        return [Candidate(program, _noise_seed(self.seed, digest)) for digest, program in programs.items()]
+        return [Candidate(program, noise_seed(self.seed, program)) for program in programs.values()]
 
     def tell(self, results: Any) -> Generation:
         """Take the scores of the programs asked for.
@@ -260,6 +260,6 @@ def _rank(score: Any) -> tuple[float, float]:
     return float(score["fitness_s"]), -float(score["share"])
 
 
-def _noise_seed(seed: int, digest: bytes) -> int:
-    """Return a program's noise seed: its own, and the same whenever the run meets it."""
-    return int.from_bytes(hashlib.blake2b(digest, digest_size=8, key=seed.to_bytes(8)).digest())
+def noise_seed(seed: int, program: Program) -> int:
+    """Return the seed of the noise a program is driven with: its own, and the same whenever the run meets it."""
+    return int.from_bytes(hashlib.blake2b(program.canonical, digest_size=8, key=seed.to_bytes(8)).digest())

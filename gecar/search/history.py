@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Generation(NamedTuple):
 
 
 HISTORY = np.dtype(
-    [(name, "<i8" if kind == "int" else "<f8") for name, kind in Generation.__annotations__.items()]
+    [(name, "<i8" if kind is int else "<f8") for name, kind in get_type_hints(Generation).items()]
 )
 """A generation's dtype in checkpoints."""
 

@@ -1,0 +1,172 @@
+"""A run's configuration: a preset, a file, options, and what all of them come to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from gecar.errors import InputError, expected
+from gecar.files import read_toml
+from gecar.language.mapping import MappingOptions
+from gecar.search.executors import MAX_WORKERS, usable_cores
+from gecar.search.settings import Settings, preset
+from gecar.world.rollout import STEP_S
+
+Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+NOT_PART_OF_THE_RESULT = {"preset", "executor", "workers"}
+"""Fields that may differ when a run is resumed: the result does not depend on them, or other fields say it."""
+_ABOUT_THE_RUN = ("provenance", "fingerprints")
+
+
+class Config(BaseModel):
+    """All that a run depends on; the defaults are the paper's.
+
+    Attributes
+    ----------
+    preset
+        Name of the search settings it started from.
+    course, grammar, robot
+        Names, or files.
+    seed
+        Where all randomness comes from.
+    executor, workers
+        Where programs are simulated.
+    time_limit_s, step_s, engine
+        As in `gecar.world.rollout.World`.
+    noise, motor_noise
+        Noise of each sensor reading [%], and of each command's strength [% of it].
+    wraps, single_choice_consumes, max_symbols
+        As in `gecar.language.mapping.MappingOptions`.
+    search
+        The evolution's settings.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    preset: str = "paper"
+    course: str = "paper"
+    grammar: str = "paper"
+    robot: str = "ev3"
+    seed: int = Field(1, ge=0, lt=2**63)
+    executor: Literal["process", "thread", "serial"] = "process"
+    workers: int = Field(default_factory=usable_cores, ge=1, le=MAX_WORKERS)
+    time_limit_s: float = Field(60.0, gt=0.0, le=3_600.0)
+    step_s: float = Field(STEP_S, ge=0.0001, le=0.01)
+    engine: Literal["auto", "inline", "pymunk"] = "auto"
+    noise: Share = 0.0
+    motor_noise: Share = 0.0
+    wraps: int = Field(MappingOptions.wraps, ge=0, le=1_000_000)
+    single_choice_consumes: bool = MappingOptions.single_choice_consumes
+    max_symbols: int = Field(MappingOptions.max_symbols, ge=1, le=10_000_000)
+    search: Settings = Settings()
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What the result depends on, files' contents apart."""
+        return self.model_dump(exclude=NOT_PART_OF_THE_RESULT)
+
+
+def configure(table: Mapping[str, Any], where: str | Path = "configuration") -> Config:
+    """Make a configuration from a table that says what differs from the paper's.
+
+    Parameters
+    ----------
+    table
+        Fields of `Config` by name; ``search`` is a table of what differs from the preset. What a run wrote about
+        itself (provenance, fingerprints) is passed over, so that its config.toml serves for a new run.
+    where
+        The file, or what else it comes from, for errors.
+
+    Raises
+    ------
+    InputError
+        If a field is unknown or out of bounds; names it.
+    """
+    given = {name: value for name, value in table.items() if name not in _ABOUT_THE_RUN}
+    search = given.get("search", {})
+    if not isinstance(search, Mapping):
+        raise expected(f"{where}, search", repr(search)[:40], "a table of settings")
+    given["search"] = preset(given.get("preset", "paper"), search, f"{where}, search")
+    for field in ("course", "grammar", "robot"):
+        if field in given:
+            given[field] = _place(str(given[field]))
+    try:
+        return Config.model_validate(given)
+    except ValidationError as error:
+        raise _first_fault(error, where) from None
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """Read a configuration file, for `configure`.
+
+    Raises
+    ------
+    InputError
+        If it is missing or not TOML.
+    """
+    return read_toml(path, "a configuration file (.toml)")
+
+
+def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with changes laid over it, in ``search`` one by one. Another preset drops the old search."""
+    other = changes.get("preset", table.get("preset", "paper")) != table.get("preset", "paper")
+    search = {**({} if other else table.get("search", {})), **changes.get("search", {})}
+    return {**table, **changes, "search": search}
+
+
+def identify(config: Config, fingerprints: Mapping[str, str]) -> str:
+    """Return a hash of all that the result depends on; a checkpoint belongs to one."""
+    text = json.dumps([config.identity, dict(fingerprints)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def as_toml(config: Config, tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Write a configuration, and tables about the run after it, as TOML."""
+    fields = config.model_dump()
+    tables = {"search": fields.pop("search"), **tables}
+    blocks = ["\n".join(f"{name} = {_toml(value)}" for name, value in fields.items())]
+    for name, table in tables.items():
+        blocks.append("\n".join([f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def difference(ours: Config, theirs: Config) -> tuple[str, Any, Any] | None:
+    """Return the first field in which two configurations' results may differ, and both values."""
+    for name, mine, other in _pairs(ours.identity, theirs.identity):
+        if mine != other:
+            return name, mine, other
+    return None
+
+
+def _pairs(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[tuple[str, Any, Any]]:
+    flat = [(name, value, theirs[name]) for name, value in ours.items() if name != "search"]
+    return flat + [
+        (f"search.{name}", value, theirs["search"][name]) for name, value in ours["search"].items()
+    ]
+
+
+def _place(name: str) -> str:
+    """Make a file's name hold wherever it is read again; other names stay."""
+    path = Path(name)
+    return str(path.resolve()) if path.is_file() else name
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)
+
+
+def _first_fault(error: ValidationError, where: str | Path) -> InputError:
+    fault = error.errors(include_url=False)[0]
+    place = f"{where}, {'.'.join(map(str, fault['loc']))}"
+    if fault["type"] == "extra_forbidden":
+        return expected(place, "an unknown field", f"one of {', '.join(Config.model_fields)}")
+    return expected(place, repr(fault["input"])[:40], fault["msg"].removeprefix("Input should be "))

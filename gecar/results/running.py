@@ -1,0 +1,239 @@
+"""A run from configuration to results: new or resumed, saved after every generation."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from gecar.calling import command
+from gecar.errors import InputError, expected
+from gecar.language.grammar import load_grammar
+from gecar.language.mapping import Mapper, MappingOptions
+from gecar.language.robot_language import check_robot_language
+from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
+from gecar.results.folder import RunFolder, check_new
+from gecar.results.provenance import fingerprints, versions
+from gecar.search.batches import Batches
+from gecar.search.evaluation import DriveEvaluator
+from gecar.search.evolution import Evolution, noise_seed, rehearse, run
+from gecar.search.executors import open_executor
+from gecar.search.history import Generation
+from gecar.world.course import load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Noise, World, simulate
+
+REPORT_EVERY_S = 2.0
+"""How often history.csv and best.txt are written while a run goes on [s]."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A configuration, and what its names stand for."""
+
+    config: Config
+    mapper: Mapper
+    world: World
+    fingerprints: Mapping[str, str]
+
+    @property
+    def configuration(self) -> str:
+        """What identifies the run: `gecar.results.config.identify`."""
+        return identify(self.config, self.fingerprints)
+
+    @property
+    def evaluator(self) -> DriveEvaluator:
+        """What scores programs."""
+        return DriveEvaluator(self.world, self.config.search.needs_arrivals)
+
+    def evolution(self) -> Evolution:
+        """Return a new evolution."""
+        return Evolution(self.config.search, self.mapper, self.config.seed, self.evaluator.n_arrivals)
+
+
+def load_task(config: Config) -> Task:
+    """Load what a configuration names.
+
+    Raises
+    ------
+    InputError
+        If there is no such grammar, course or robot, one of them is wrong, or the grammar's words are no programs.
+    """
+    grammar = load_grammar(config.grammar)
+    check_robot_language(grammar)
+    options = MappingOptions(config.wraps, config.single_choice_consumes, config.max_symbols)
+    robot, course = load_robot(config.robot), load_course(config.course)
+    noise = Noise(config.noise, 0.01 * config.motor_noise)
+    world = World(robot, course, config.step_s, config.time_limit_s, noise, config.engine)
+    return Task(config, Mapper(grammar, options), world, fingerprints(grammar, course, robot))
+
+
+@dataclass(frozen=True)
+class Started:
+    """A run that can go on: its task, its folder, and its evolution as far as it came."""
+
+    task: Task
+    folder: RunFolder
+    evolution: Evolution
+
+
+def start(config: Config, out: Path) -> Started:
+    """Begin a run in a new folder.
+
+    Raises
+    ------
+    InputError
+        If the folder exists, or as `load_task`.
+    """
+    check_new(out)
+    task = load_task(config)
+    about = {"provenance": versions(), "fingerprints": task.fingerprints}
+    return Started(task, RunFolder.create(out, as_toml(config, about)), task.evolution())
+
+
+def resume(out: Path, changes: Mapping[str, Any] | None = None) -> Started:
+    """Go on with a run where it was stopped.
+
+    Parameters
+    ----------
+    out
+        Its folder.
+    changes
+        Options given again, as for `gecar.results.config.merged`; only those that leave the result alone may differ.
+
+    Raises
+    ------
+    InputError
+        If it is no run's folder, the checkpoint is damaged, or options or files have changed since.
+    """
+    folder, place = RunFolder(out), out / "config.toml"
+    table = read_config(place)
+    config = configure(table, place)
+    wanted = configure(merged(table, changes or {}), "options")
+    found = difference(wanted, config)
+    if found:
+        raise expected("--resume", f"{found[0]} = {found[1]!r}", f"{found[2]!r} as in {place}")
+    task = load_task(wanted)
+    _check_unchanged(table, task, place)
+    folder.sweep()
+    state = folder.load(task.configuration)
+    evolution = task.evolution()
+    if state is not None:
+        evolution = Evolution.resume(wanted.search, task.mapper, state, task.evaluator.n_arrivals)
+    return Started(task, folder, evolution)
+
+
+def _check_unchanged(table: Mapping[str, Any], task: Task, place: Path) -> None:
+    """Refuse where a grammar, course or robot reads otherwise now; say so where gecar or a library is another."""
+    before = table.get("fingerprints", {})
+    for kind, now in task.fingerprints.items():
+        if before.get(kind) != now:
+            name = getattr(task.config, kind)
+            raise expected(
+                "--resume", f"{kind} {name!r} changed since the run began", f"the one that {place} knows"
+            )
+    was, here = table.get("provenance", {}), versions()
+    for name in ("gecar", "numba", "numpy", "pymunk"):
+        if was.get(name) != here[name]:
+            words = (
+                f"{place}: begun with {name} {was.get(name)}, going on with {here[name]}; the end may differ"
+            )
+            print(words, file=sys.stderr)
+
+
+def finish(started: Started, after: Callable[[Generation], None] = lambda generation: None) -> dict[str, Any]:  # noqa: ARG005
+    """Run to the last generation, saving each, and write the results.
+
+    Parameters
+    ----------
+    started
+        New or resumed.
+    after
+        Called with each generation's record, once it is saved.
+
+    Returns
+    -------
+    dict
+        What result.json says.
+
+    Raises
+    ------
+    InputError
+        If a file can not be written, or workers die again and again.
+    KeyboardInterrupt
+        On Ctrl-C, after the reports are written and the way to go on is printed.
+    """
+    task, folder, evolution = started.task, started.folder, started.evolution
+    saver = _Saver(started)
+
+    def saved(generation: Generation) -> None:
+        saver()
+        after(generation)
+
+    try:
+        if not evolution.finished:
+            _run(task, evolution, saved)
+    except KeyboardInterrupt:
+        _leave(folder, evolution)
+        raise
+    folder.write_reports(evolution)
+    return folder.write_result(evolution, {"verified_on_pymunk": verified_on_pymunk(task, evolution)})
+
+
+def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) -> None:
+    config = task.config
+    open_again = partial(open_executor, config.executor, config.workers)
+    with Batches(task.evaluator, open_again, config.workers) as batches:
+        rehearse(config.search, task.mapper)
+        batches.warm()
+        run(evolution, batches, after)
+
+
+class _Saver:
+    """Saves a run after each generation: the checkpoint always, what people look at now and then."""
+
+    def __init__(self, started: Started) -> None:
+        self.started = started
+        self.configuration = started.task.configuration
+        self.reported = time.monotonic()
+
+    def __call__(self) -> None:
+        evolution, folder = self.started.evolution, self.started.folder
+        folder.save(evolution.state(), self.configuration)
+        if time.monotonic() - self.reported > REPORT_EVERY_S:
+            folder.write_reports(evolution)
+            self.reported = time.monotonic()
+
+
+def _leave(folder: RunFolder, evolution: Evolution) -> None:
+    """Say how to go on; a second Ctrl-C must not cut this short."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    print(
+        f"stopped after generation {evolution.generation} of {evolution.settings.generations}; it is saved. "
+        f"Go on with: {command()} evolve --resume --out {folder.path}",
+        file=sys.stderr,
+        flush=True,
+    )
+    try:
+        folder.write_reports(evolution)
+    except InputError as error:
+        print(error, file=sys.stderr)
+
+
+def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:
+    """Drive the best program once more with pymunk moving the body; tell whether it ends the same within a step."""
+    best = evolution.best
+    if best.program is None:
+        return False
+    seed = noise_seed(evolution.seed, best.program)
+    drive = simulate(replace(task.world, engine="pymunk"), best.program.opcodes, seed)
+    score = best.score[0]
+    near = abs(drive.time_s - float(score["time_s"])) <= 1.5 * task.config.step_s
+    return bool(drive.outcome == score["outcome"] and near)
