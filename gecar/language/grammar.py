@@ -207,7 +207,9 @@ def load_grammar(name: str | Path, ranges: Mapping[str, int] | None = None) -> G
         if path.parent == Path() and named.exists():
             return read_grammar(named, ranges)
     raise expected(
-        "grammar", f"no file or grammar {str(name)!r}", f"a .bnf file, or one of {', '.join(list_grammars())}"
+        "grammar",
+        f"no file or grammar {str(name)!r}",
+        f"a .bnf file, or one of {', '.join(sorted(list_grammars()))}",
     )
 
 
