@@ -29,6 +29,7 @@ from gecar.results.config import as_toml, configure, difference, merged
 from gecar.results.folder import read_history, read_result
 from gecar.results.provenance import versions
 from gecar.results.running import finish, resume, start
+from gecar.results.saving import Saver
 from gecar.search.evolution import Evolution
 from gecar.search.history import Generation
 from gecar.search.state import State
@@ -134,6 +135,32 @@ def test_ctrl_c_says_how_to_go_on_and_the_end_is_the_same(
     assert outputs(out) == outputs(undisturbed)
 
 
+def test_checkpoints_take_a_bounded_share_of_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[Path] = []
+    started = start(configure(SHORT), tmp_path / "run")
+    monkeypatch.setattr(started.folder.__class__, "save", lambda *_: written.append(HERE) or time.sleep(0.05))
+    saver = Saver(started.folder, started.evolution, "mine")
+    generations(started.evolution, 1)
+    for _ in range(5):
+        saver()
+    assert len(written) == 1
+    saver.save()
+    saver.save()
+    assert len(written) == 2
+
+
+def test_ctrl_c_before_the_first_generation_is_no_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr(Evolution, "ask", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        finish(start(configure(SHORT), tmp_path / "run"))
+    assert capsys.readouterr().err.startswith("stopped before the first generation. Go on with: ")
+
+
 def test_a_finished_run_may_be_resumed_and_stays_as_it_is(stopped: Path, undisturbed: Path) -> None:
     for _ in range(2):
         finish(resume(stopped))
@@ -225,13 +252,13 @@ def test_a_full_disk_ends_in_one_line_and_the_run_goes_on_later(
 
     def full(path: Path, content: str | bytes, durable: bool = True) -> None:
         calls.append(path)
-        if len(calls) > 3:
+        if len(calls) > 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         write(path, content, durable)
 
     monkeypatch.setattr(folder_module, "write_whole", full)
     with pytest.raises(
-        InputError, match="checkpoint: found No space left on device, expected to write it; all before"
+        InputError, match=r"run/[a-z.]+: found No space left on device, expected to write it; all before"
     ):
         finish(start(configure(SHORT), out))
     monkeypatch.undo()

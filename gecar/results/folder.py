@@ -121,12 +121,12 @@ class RunFolder:
             raise expected(place, error.strerror or "an unreadable file", "a gecar checkpoint") from None
         return unpack(raw, configuration, place)
 
-    def write_reports(self, evolution: Evolution) -> None:
+    def write_reports(self, evolution: Evolution, durable: bool = True) -> None:
         """Write history.csv and best.txt, if there is a generation to tell of."""
         if evolution.history:
-            self.write("history.csv", history_csv(evolution.history))
+            self.write("history.csv", history_csv(evolution.history), durable)
             program = evolution.best.program
-            self.write("best.txt", f"{program}\n" if program else "")
+            self.write("best.txt", f"{program}\n" if program else "", durable)
 
     def write_result(self, evolution: Evolution, more: Mapping[str, Any]) -> dict[str, Any]:
         """Write result.json and return what it says.

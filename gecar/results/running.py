@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
-import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gecar.calling import command
 from gecar.errors import InputError, expected
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
@@ -20,6 +17,7 @@ from gecar.language.robot_language import check_robot_language
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
 from gecar.results.folder import RunFolder, check_new
 from gecar.results.provenance import fingerprints, versions
+from gecar.results.saving import Saver
 from gecar.search.batches import Batches
 from gecar.search.evaluation import DriveEvaluator
 from gecar.search.evolution import Evolution, noise_seed, rehearse, run
@@ -28,9 +26,6 @@ from gecar.search.history import Generation
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
-
-REPORT_EVERY_S = 2.0
-"""How often history.csv and best.txt are written while a run goes on [s]."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +165,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
         On Ctrl-C, after the reports are written and the way to go on is printed.
     """
     task, folder, evolution = started.task, started.folder, started.evolution
-    saver = _Saver(started)
+    saver = Saver(folder, evolution, task.configuration)
 
     def saved(generation: Generation) -> None:
         saver()
@@ -180,8 +175,13 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
         if not evolution.finished:
             _run(task, evolution, saved)
     except KeyboardInterrupt:
-        _leave(folder, evolution)
+        saver.leave()
         raise
+    except InputError:
+        with suppress(InputError):  # the first error is the one to tell
+            saver.save()
+        raise
+    saver.save()
     folder.write_reports(evolution)
     return folder.write_result(evolution, {"verified_on_pymunk": verified_on_pymunk(task, evolution)})
 
@@ -193,38 +193,6 @@ def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) 
         rehearse(config.search, task.mapper)
         batches.warm()
         run(evolution, batches, after)
-
-
-class _Saver:
-    """Saves a run after each generation: the checkpoint always, what people look at now and then."""
-
-    def __init__(self, started: Started) -> None:
-        self.started = started
-        self.configuration = started.task.configuration
-        self.reported = time.monotonic()
-
-    def __call__(self) -> None:
-        evolution, folder = self.started.evolution, self.started.folder
-        folder.save(evolution.state(), self.configuration)
-        if time.monotonic() - self.reported > REPORT_EVERY_S:
-            folder.write_reports(evolution)
-            self.reported = time.monotonic()
-
-
-def _leave(folder: RunFolder, evolution: Evolution) -> None:
-    """Say how to go on; a second Ctrl-C must not cut this short."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-    print(
-        f"stopped after generation {evolution.generation} of {evolution.settings.generations}; it is saved. "
-        f"Go on with: {command()} evolve --resume --out {folder.path}",
-        file=sys.stderr,
-        flush=True,
-    )
-    try:
-        folder.write_reports(evolution)
-    except InputError as error:
-        print(error, file=sys.stderr)
 
 
 def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:
