@@ -206,6 +206,8 @@ def load_grammar(name: str | Path, ranges: Mapping[str, int] | None = None) -> G
         named = folder / (path.name if path.suffix == ".bnf" else f"{path.name}.bnf")
         if path.parent == Path() and named.exists():
             return read_grammar(named, ranges)
+    if path.exists():
+        return read_grammar(path, ranges)  # a folder, say: the error says so
     raise expected(
         "grammar",
         f"no file or grammar {str(name)!r}",
