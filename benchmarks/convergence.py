@@ -43,7 +43,7 @@ def start_moved(x: float, y: float, heading: float) -> World:
     """Return the world with another start [m, m, rad]."""
     start = WORLD.course.start
     pose = Pose(start.x_m + x, start.y_m + y, start.heading_rad + heading)
-    return replace(WORLD, course=replace(WORLD.course, start=pose))
+    return replace(WORLD, course=WORLD.course.starting(pose))
 
 
 def with_step(step_s: float) -> World:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from gecar.world.lower_bound import fastest_time
 from gecar.world.obstacle import Obstacle
 from gecar.world.raster import PITCH_M, FloorImage
 from gecar.world.robot import Robot
+from gecar.world.sensing import spot_average
 from gecar.world.shortest import ShortestWay, shortest_way
 
 __all__ = ["COURSES", "Course", "Obstacle", "Pose", "list_courses", "load_course", "parse_course"]
@@ -68,6 +69,7 @@ class Course:
     title: str = ""
     notes: str = ""
     _rasters: dict[float, npt.NDArray[np.uint8]] = field(default_factory=dict, init=False, repr=False)
+    _averages: dict[float, npt.NDArray[np.float32]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def tile_size_m(self) -> float:
@@ -173,6 +175,19 @@ class Course:
         if pitch_m not in self._rasters:
             self._rasters[pitch_m] = self._draw(pitch_m)
         return self._rasters[pitch_m]
+
+    def averaged(self, spot_m: float) -> npt.NDArray[np.float32]:
+        """Return the floor's brightness averaged over a sensor's spot [m]; see `spot_average`. Kept, as `raster`."""
+        if spot_m not in self._averages:
+            self._averages[spot_m] = spot_average(self.raster(), self.pitch_m, spot_m)
+        return self._averages[spot_m]
+
+    def starting(self, pose: Pose) -> Course:
+        """Return the course with another start; it shares this one's rasters."""
+        moved = replace(self, start=pose)
+        object.__setattr__(moved, "_rasters", self._rasters)
+        object.__setattr__(moved, "_averages", self._averages)
+        return moved
 
     def _draw(self, pitch_m: float) -> npt.NDArray[np.uint8]:
         size = self.width_m, self.height_m, pitch_m

@@ -17,7 +17,7 @@ from gecar.world.course import Course
 from gecar.world.driving import drive
 from gecar.world.interpreter import CONTROL, EYES, Floor
 from gecar.world.robot import Robot
-from gecar.world.sensing import RING, spot_average
+from gecar.world.sensing import RING
 from gecar.world.space import build_engine
 from gecar.world.state import DERIVED, STATE, derive
 
@@ -128,7 +128,7 @@ class World:
         course = self.course
         spot = float(self.robot.physics["spot_diameter"][0])
         return Floor(
-            spot_average(course.raster(), course.pitch_m, spot),
+            course.averaged(spot),
             course.pitch_m,
             course.tile_size_m,
             course.columns,
