@@ -69,6 +69,7 @@ SEATS = (
     Seat("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     Seat("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
     Seat("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
+    Seat("motor", ROBOT, "Draw the motor's speed against input and power: Figs 7, 8.", "motor:motor"),
     Seat("compare", ROBOT, "Set simulation beside recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"),
     Seat("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
     Seat("discover", ROBOT, "Find which physics the simulation left out.", "discover:discover"),
@@ -117,9 +118,9 @@ def _root(
 
     [bold]Start here[/]
 
-      gecar evolve                      a program for the paper's course, with pictures
-      gecar simulate runs/.../best.txt  drive it again
-      gecar course list                 where else to drive
+      gecar evolve             a program for the paper's course, and pictures
+      gecar simulate runs/...  drive it again, or film it
+      gecar course list        where else to drive
 
     Every command explains itself: [bold]gecar evolve --help[/]
     """

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 IdArgument = Annotated[
     str | None,
-    typer.Argument(metavar="[ID]", help="One effect, with all that is known of it.", show_default=False),
+    typer.Argument(metavar="ID", help="One effect, with all that is known of it.", show_default=False),
 ]
 
 

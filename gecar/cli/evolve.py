@@ -21,62 +21,39 @@ from gecar.errors import expected
 SEARCH, RUN = "Search (default: the preset's)", "Run"
 
 
+def _search(name: str, words: str, default: str | bool = False, metavar: str | None = None) -> Any:
+    """Return an option of the search."""
+    return typer.Option(name, help=words, show_default=default, metavar=metavar, rich_help_panel=SEARCH)
+
+
 def evolve(
     config: Annotated[
         Path | None,
-        typer.Argument(metavar="[CONFIG.toml]", show_default=False,
-                       help="Settings, as in the config.toml of a run's folder; options go before them."),
+        typer.Argument(metavar="CONFIG.toml", show_default=False,
+                       help="Settings, as in the config.toml of a run's folder; options override them."),
     ] = None,
     preset: Annotated[
-        str | None,
-        typer.Option("--preset", metavar="NAME", help="Search settings: paper is Table 4; random is random search.",
-                     show_default="paper", rich_help_panel=SEARCH),
+        str | None, _search("--preset", "Search settings: paper is Table 4; random is random search.", "paper", "NAME")
     ] = None,
-    population: Annotated[
-        int | None,
-        typer.Option("--population", help="Programs in a generation.", show_default=False, rich_help_panel=SEARCH),
-    ] = None,
-    generations: Annotated[
-        int | None,
-        typer.Option("--generations", help="How often they are bred anew.", show_default=False, rich_help_panel=SEARCH),
-    ] = None,
-    codons: Annotated[
-        int | None,
-        typer.Option("--codons", "--gene-length", help="Codons in a genome.", show_default=False,
-                     rich_help_panel=SEARCH),
-    ] = None,
-    elites: Annotated[
-        int | None,
-        typer.Option("--elites", help="Best ones that stay as they are.", show_default=False, rich_help_panel=SEARCH),
-    ] = None,
-    tournament: Annotated[
-        int | None,
-        typer.Option("--tournament", help="Candidates of a selection.", show_default=False, rich_help_panel=SEARCH),
-    ] = None,
+    population: Annotated[int | None, _search("--population", "Programs in a generation; paper: 200.")] = None,
+    generations: Annotated[int | None, _search("--generations", "How often they are bred anew; paper: 50.")] = None,
+    codons: Annotated[int | None, _search("--codons", "Codons in a genome, the gene length; paper: 1000.")] = None,
+    elites: Annotated[int | None, _search("--elites", "Best ones that stay as they are; paper: 1.")] = None,
+    tournament: Annotated[int | None, _search("--tournament", "Candidates of a selection; paper: 5.")] = None,
     crossover_rate: Annotated[
-        float | None,
-        typer.Option("--crossover-rate", help="Share of pairs that are crossed.", show_default=False,
-                     rich_help_panel=SEARCH),
+        float | None, _search("--crossover-rate", "Share of pairs that are crossed; paper: 0.4, 0.5, 0.7.")
     ] = None,
     mutation_rate: Annotated[
-        float | None,
-        typer.Option("--mutation-rate", help="Share of codons drawn anew.", show_default=False, rich_help_panel=SEARCH),
+        float | None, _search("--mutation-rate", "Share of codons drawn anew; paper: 0.03, 0.05, 0.07.")
     ] = None,
     setting: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", show_default=False, rich_help_panel=SEARCH,
-                     help="Any other search setting, as in config.toml: --set crossover=subtree."),
+        _search("--set", "Any other search setting, as in config.toml: --set crossover=subtree.", metavar="NAME=VALUE"),
     ] = None,
     grammar: Annotated[
-        str | None,
-        typer.Option("--grammar", metavar="NAME|FILE", help="What programs are made of.", show_default="paper",
-                     rich_help_panel=SEARCH),
+        str | None, _search("--grammar", "What programs are made of.", "paper", "NAME|FILE")
     ] = None,
-    wraps: Annotated[
-        int | None,
-        typer.Option("--wraps", help="How often reading a genome starts again.", show_default="0",
-                     rich_help_panel=SEARCH),
-    ] = None,
+    wraps: Annotated[int | None, _search("--wraps", "How often reading a genome starts again.", "0")] = None,
     course: CourseOption = None,
     robot: RobotOption = None,
     noise: NoiseOption = None,

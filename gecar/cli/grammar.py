@@ -121,7 +121,7 @@ def derive(
 def map_genomes(
     name: GrammarArgument,
     genome: Annotated[
-        str | None, typer.Argument(metavar="[GENOME]", help="Codons; without them, random genomes.")
+        str | None, typer.Argument(metavar="GENOME", help="Codons; without them, random genomes.")
     ] = None,
     count: Annotated[int, typer.Option("--count", help="How many random genomes.")] = 5,
     length: Annotated[int, typer.Option("--codons", help="Codons in each of them.")] = 1000,
