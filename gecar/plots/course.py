@@ -24,7 +24,7 @@ from gecar.world.robot import Robot
 from gecar.world.tiles import Side
 
 # Orders of drawing; paths and robots come at 3 and above.
-_BELOW, _TINT, _GRID, _LINE, _MARKS, _SHADOW, _THINGS = 0.1, 0.2, 0.3, 1.0, 1.2, 1.5, 1.6
+_BEYOND, _TINT, _GRID, _LINE, _MARKS, _SHADOW, _THINGS = 0.1, 0.2, 0.3, 1.0, 1.2, 1.5, 1.6
 OFF_COURSE, SEAM = "#E9EDF1", "#EDF0F3"
 FIXED, WALL = "#8C96A0", "#6B5B4B"
 WALL_HALF_WIDTH_M = 0.005  # as the walls that robots touch
@@ -76,7 +76,7 @@ def describe(course: Course, robot: Robot | None = None) -> str:
     words = [
         f"{course.width_m:g} × {course.height_m:g} m",
         f"{len(course.checkpoints)} checkpoints",
-        f"line {course.length_m:.2f} m",
+        *([f"line {course.length_m:.2f} m"] if course.length_m > 0.0 else []),
         f"shortest way {course.shortest.length_m:.2f} m" + (" (dashed)" if robot else ""),
     ]
     if robot is not None:
@@ -94,22 +94,19 @@ def outline_patch(shape: BaseGeometry, **style: Any) -> PathPatch:
 
 
 def _draw_floor(axes: Axes, course: Course) -> None:
-    field = box(0, 0, course.width_m, course.height_m)
-    axes.add_patch(outline_patch(field, facecolor=OFF_COURSE, edgecolor="none", zorder=0))
-    tiles = shapely.union_all(
-        [course.layout.square(int(k)) for k in np.flatnonzero(course.drivable)], grid_size=1e-9
-    )
-    floor = outline_patch(tiles, facecolor=PAPER, edgecolor="none", zorder=_BELOW)
-    axes.add_patch(floor)
+    squares = [course.layout.square(int(k)) for k in np.flatnonzero(course.drivable)]
+    tiles = shapely.union_all(squares, grid_size=1e-9)
+    beyond = box(0, 0, course.width_m, course.height_m).difference(tiles)
+    axes.add_patch(outline_patch(tiles, facecolor=PAPER, edgecolor="none", zorder=0))
     if course.image:
         extent = (0, course.width_m, 0, course.height_m)
         picture = course.raster(max(0.001, course.width_m / 2000))
-        axes.imshow(
-            picture, extent=extent, origin="lower", cmap="gray", vmin=0, vmax=255, zorder=_BELOW, alpha=0.9
-        )
-    axes.add_collection(
-        LineCollection(_seams(course), colors=SEAM, linewidths=0.7, zorder=_GRID), autolim=False
-    )
+        axes.imshow(picture, extent=extent, origin="lower", cmap="gray", vmin=0, vmax=255, zorder=0)
+    else:
+        seams = LineCollection(_seams(course), colors=SEAM, linewidths=0.7, zorder=_GRID)
+        axes.add_collection(seams, autolim=False)
+    shade = 0.7 if course.image else 1.0
+    axes.add_patch(outline_patch(beyond, facecolor=OFF_COURSE, edgecolor="none", alpha=shade, zorder=_BEYOND))
     axes.add_patch(outline_patch(tiles, facecolor="none", edgecolor=FAINT, linewidth=0.9, zorder=_GRID))
     axes.add_patch(outline_patch(course.line_area, facecolor=INK, edgecolor="none", zorder=_LINE))
 

@@ -138,7 +138,7 @@ class CourseTable(_Table):
     map: str
     start: StartTable
     goal: _Place
-    checkpoints: Annotated[list[_Place], Field(max_length=4096)] | None = None
+    checkpoints: Annotated[list[_Place], Field(max_length=2048)] | None = None
     tile_size_m: Annotated[float, Strict(), Field(ge=0.02, le=5, allow_inf_nan=False)] | None = None
     field_m: _Size | None = None
     line_width_m: _Positive = 0.025

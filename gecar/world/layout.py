@@ -91,8 +91,12 @@ class Layout:
 
     def drivable_neighbours(self, index: int) -> list[int]:
         """Return the tiles a robot can drive to over an edge."""
-        beyond = (self.neighbour(index, side) for side in Side)
-        return [n for n in beyond if n >= 0 and self.drivable[n]]
+        return self._drivable_neighbours[index]
+
+    @cached_property
+    def _drivable_neighbours(self) -> list[list[int]]:
+        around = ([self.neighbour(k, side) for side in Side] for k in range(len(self.characters)))
+        return [[n for n in beyond if n >= 0 and self.drivable[n]] for beyond in around]
 
     def line_neighbours(self, index: int) -> Iterator[tuple[Side, int]]:
         """Yield the sides over which the line goes on, and the tile there."""
@@ -198,7 +202,7 @@ def check_lines_join(layout: Layout, start: int, goal: int, where: str) -> None:
 
 def _loose_end(layout: Layout, index: int, side: Side, where: str) -> InputError:
     beyond = layout.neighbour(index, side)
-    there = f"tile '{layout.characters[beyond]}' there" if beyond >= 0 else "the field's edge"
+    there = f"tile '{layout.characters[beyond]}'" if beyond >= 0 else "the field's edge"
     place = f"{where}, tile {list(layout.place(index))} '{layout.characters[index]}'"
     return expected(
         place, f"a line that leaves {_TOWARDS[side]} and stops at {there}", "a tile whose line meets it"

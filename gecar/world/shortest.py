@@ -91,6 +91,8 @@ def _must_pass(layout: Layout, start: int, end: int, avoid: int) -> list[int]:
             for beyond in _beyond(layout, waiting.pop(), avoid):
                 if beyond in position:
                     farthest = max(farthest, position[beyond])
+                    if farthest == len(route) - 1 > k + 1:
+                        return [*kept, end]
                 elif beyond not in seen and beyond != avoid:
                     seen.add(beyond)
                     waiting.append(beyond)
