@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -89,7 +90,7 @@ class Batches:
     def close(self) -> None:
         """Let the workers go; what they still do is dropped."""
         if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor.shutdown(wait=False)
             self._executor = None
 
     def _cut(self, n: int) -> list[slice]:
@@ -125,16 +126,16 @@ class Batches:
             self._executor = self._open()
         futures: dict[int, Future[Scored]] = {}
         done: dict[int, Scored] = {}
-        try:
+        with suppress(BrokenExecutor):  # batches not sent are lost like those of the worker that died
             for k, (programs, seeds) in batches.items():
                 futures[k] = self._executor.submit(score_batch, self._recipe, programs, seeds)
-        except BrokenExecutor:
-            pass  # the batches not sent are lost like those of the worker that died
-        for k, future in futures.items():
-            try:
-                done[k] = future.result()
-            except BrokenExecutor:
-                continue
+        try:
+            for k, future in futures.items():
+                with suppress(BrokenExecutor):
+                    done[k] = future.result()
+        finally:
+            for future in futures.values():  # after Ctrl-C nobody wants the rest; those done do not mind
+                future.cancel()
         return done
 
     def _recover(self, lost: int, deaths: int) -> None:
