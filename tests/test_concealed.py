@@ -160,7 +160,7 @@ def test_scorer_tells_right_from_wrong(examination, tmp_path):
     assert values["outside the catalogue: abstains"] == 1.0
     assert values["95 % intervals cover"] == 1.0
     draw(judged, tmp_path / "confusion.png")
-    assert "| a | (nothing) | track_width |" in report(judged, "test", "0")
+    assert "| a | (nothing) | track_width |" in report(judged, "test", "0", 3)
 
 
 def test_both_of_two_effects_need_a_name_of_their_own():

@@ -122,7 +122,8 @@ def _score(chosen: argparse.Namespace) -> int:
     from benchmarks.concealed.tables import draw, report  # noqa: PLC0415
 
     judged = score(chosen.out, chosen.verdicts, chosen.workers)
-    text = report(judged, chosen.title, manifest_hash(chosen.out))
+    sealed = sum(1 for path in (chosen.out / "sealed").iterdir() if path.is_dir())
+    text = report(judged, chosen.title, manifest_hash(chosen.out), sealed)
     if chosen.report is None:
         print(text)
         return 0

@@ -25,7 +25,7 @@ from benchmarks.concealed.robot import (
 )
 
 STEP_S = 0.0005  # halving it moves nothing that a sensor sees
-BUMP_RADIUS = 0.05  # m, the ridge is the cap of a lying cylinder
+BUMP_RADIUS = 0.20  # m, the ridge is the cap of a lying cylinder
 
 # Joint limits and dry friction: as hard as the step allows.
 _HARD = 'solimp{0}="0.9999 0.9999 0.001" solref{0}="0.003 1"'
@@ -86,12 +86,17 @@ def _chassis(concealed: Concealed) -> str:
     inertia = f"{CHASSIS_ROLL_INERTIA} {CHASSIS_PITCH_INERTIA} {yaw!r}"
     left, right = radii(concealed)
     return (
-        f'<body name="chassis" pos="0 0 {height!r}"><freejoint/>'
+        f'<body name="chassis" pos="0 0 {height + _unevenness(concealed)!r}"><freejoint/>'
         f'<inertial pos="{ahead!r} 0 {up!r}" mass="{mass}" diaginertia="{inertia}"/>'
         f'<geom name="caster" type="sphere" size="{CASTER_RADIUS}" {_GHOST} '
         f'pos="{CASTER_AHEAD} 0 {CASTER_RADIUS - height!r}"/>'
         f"{_wheel(concealed, 'left', half_track, left)}{_wheel(concealed, 'right', -half_track, right)}</body>"
     )
+
+
+def _unevenness(concealed: Concealed) -> float:
+    """Say how far a wheel may reach below its mean radius [m]: the robot is put down from there, not into the floor."""
+    return max(shape[0] if shape else 0.0 for shape in (concealed.off_centre, concealed.oval))
 
 
 def _wheel(concealed: Concealed, side: str, y: float, radius: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -24,7 +25,16 @@ from benchmarks.concealed.recording import (
     write_recording,
 )
 from benchmarks.concealed.robot import NEUTRAL, Concealed
-from benchmarks.concealed.truth import ROW_TICKS, Array, Controller, History, Pose, Truth, replayed
+from benchmarks.concealed.truth import (
+    ROW_TICKS,
+    Array,
+    Controller,
+    History,
+    Pose,
+    ToppledError,
+    Truth,
+    replayed,
+)
 
 # Six recordings to learn from and two to be judged by, of kinds that the six do not hold.
 RUNS = ("holds", "holds", "holds_gentle", "sines", "line", "line", "reversals", "line_smooth")
@@ -63,21 +73,36 @@ def draw_case(name: str, kind: str, effects: tuple[str, ...], seed: tuple[int, .
     out
         ``out/cases/NAME`` receives the recordings, ``out/sealed/NAME`` the label and the noise-free channels.
     """
-    rng, *run_rngs = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(1 + len(RUNS)))
-    hidden = conceal(kind, effects, rng)
-    conditions = _conditions(rng, hidden)
     folder, sealed = out / "cases" / name, out / "sealed" / name
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
-    worlds: dict[str, Array] = {}
-    for run, run_rng in enumerate(run_rngs):
-        path = folder / f"run_{run + 1:02d}_{RUNS[run]}.csv"
-        worlds |= _record(path, run, hidden, conditions, run_rng)
+    for attempt in itertools.count():
+        try:
+            hidden, conditions, worlds = _recorded(kind, effects, (*seed, attempt), folder)
+            break
+        except (
+            ToppledError
+        ):  # a robot this tall, or a ridge this high: nobody would keep the recording; draw again
+            continue
     single: dict[str, Any] = {key: array.astype(np.float32) for key, array in worlds.items()}
     np.savez_compressed(sealed / "truth.npz", **single)
     about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed), "conditions": asdict(conditions)}
     about |= {"runs": list(RUNS), "holdout": list(HOLDOUT), "robot": _plain(hidden.robots[0])}
     (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
+
+
+def _recorded(
+    kind: str, effects: tuple[str, ...], seed: tuple[int, ...], folder: Path
+) -> tuple[Hidden, Conditions, dict[str, Array]]:
+    """Draw a robot and how it is recorded, and record it."""
+    rng, *run_rngs = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(1 + len(RUNS)))
+    hidden = conceal(kind, effects, rng)
+    conditions = _conditions(rng, hidden)
+    worlds: dict[str, Array] = {}
+    for run, run_rng in enumerate(run_rngs):
+        path = folder / f"run_{run + 1:02d}_{RUNS[run]}.csv"
+        worlds |= _record(path, run, hidden, conditions, run_rng)
+    return hidden, conditions, worlds
 
 
 def conceal(kind: str, effects: tuple[str, ...], rng: Rng) -> Hidden:

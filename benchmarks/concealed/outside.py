@@ -59,13 +59,13 @@ def _oval(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
 
 def _tether(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
     x, y = float(rng.uniform(0.4, 2.0)), float(rng.uniform(0.2, 1.0))
-    stiffness = strength(rng, 0.5, 5.0, 0.0)
+    stiffness = strength(rng, 0.4, 2.5, 0.0)
     return _same(runs, {"x_m": x, "y_m": y, "n_per_m": stiffness}, tether=(x, y, stiffness))
 
 
 def _magnet(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
     x, y, core = float(rng.uniform(0.9, 1.5)), float(rng.uniform(0.45, 0.75)), float(rng.uniform(0.10, 0.25))
-    pull = strength(rng, 0.5, 4.0, 0.0)
+    pull = strength(rng, 0.4, 2.5, 0.0)
     return _same(runs, {"x_m": x, "y_m": y, "core_m": core, "pull_n": pull}, magnet=(x, y, core, pull))
 
 
@@ -78,7 +78,7 @@ def _waves(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
 
 def _gusts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
     """Draw eight gusts a run, each from anywhere."""
-    force = strength(rng, 0.5, 4.0, 0.0)
+    force = strength(rng, 0.4, 2.5, 0.0)
 
     def gust() -> tuple[float, float, float, float]:
         way, length = _phase(rng), float(rng.uniform(0.15, 0.6))
@@ -94,10 +94,11 @@ def _air_drag(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
 
 
 def _bump(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+    """Lay a ridge where line followers pass and no recording starts."""
     height, x, angle = (
-        strength(rng, 0.001, 0.004, 0.0),
-        float(rng.uniform(1.0, 1.4)),
-        float(rng.uniform(-0.6, 0.6)),
+        strength(rng, 0.0012, 0.004, 0.0),
+        float(rng.uniform(0.5, 0.7)),
+        float(rng.uniform(-0.3, 0.3)),
     )
     return _same(runs, {"height_m": height, "x_m": x, "angle_rad": angle}, bump=(height, x, angle))
 

@@ -21,7 +21,7 @@ NOTHING, UNEXPLAINED = "(nothing)", "(unexplained)"
 _BANDS = (0.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0, math.inf)
 
 
-def report(judged: Sequence[Judged], title: str, source: str) -> str:
+def report(judged: Sequence[Judged], title: str, source: str, sealed: int) -> str:
     """Write the scores as Markdown.
 
     Parameters
@@ -32,12 +32,15 @@ def report(judged: Sequence[Judged], title: str, source: str) -> str:
         Whose verdicts these are.
     source
         Hash of the manifest the cases were sealed with.
+    sealed
+        How many cases it holds; those without a verdict are not scored, so their number is stated.
 
     Returns
     -------
     str
     """
-    parts = [f"# {title}\n\n{len(judged)} cases; manifest {source}\n", _figure_table(figures(judged))]
+    about = f"{len(judged)} of {sealed} sealed cases have a verdict; manifest {source}"
+    parts = [f"# {title}\n\n{about}\n", _figure_table(figures(judged))]
     parts += ["## By loudness\n", _band_table(judged), "## By effect\n", _effect_table(judged)]
     parts += [
         "## Outside the catalogue\n",

@@ -22,9 +22,14 @@ Controller = Callable[[float, int], "tuple[int, int] | None"]
 
 ROW_TICKS = 10  # a row of the recording, and a turn of the controller, every 10 ms
 _STEPS_PER_TICK = 2
-_SETTLE_STEPS = 400  # 0.2 s on level ground, until tyres and caster carry their loads
+_SETTLE_STEPS = 800  # 0.4 s on level ground, until tyres and caster carry their loads
+_UPRIGHT = math.cos(math.radians(20.0))
 
 mujoco.set_mju_user_warning(lambda _: None)  # or it writes a log file into whatever folder this runs in
+
+
+class ToppledError(ValueError):
+    """The robot fell over: no recording of a drive."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,11 @@ class Truth:
         -------
         History
             One entry per tick, the first before anything moved.
+
+        Raises
+        ------
+        ToppledError
+            If the robot leans by more than 20 degrees.
         """
         count = round(seconds / TICK_S) + 1
         noise = np.zeros(count) if reading_noise is None else reading_noise
@@ -139,6 +149,9 @@ class Truth:
 
     def _remember(self, log: History, tick: int, state: mujoco.MjData) -> None:
         w, x, y, z = state.qpos[3:7]
+        if 1.0 - 2.0 * (x * x + y * y) < _UPRIGHT:
+            message = f"the robot fell over at {log.time_s[tick]:.2f} s"
+            raise ToppledError(message)
         heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         log.pose[tick] = (state.qpos[0], state.qpos[1], heading)
         log.angles[tick] = state.qpos[self._angle_at]
