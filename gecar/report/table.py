@@ -1,0 +1,194 @@
+"""A study in words: as a table for a terminal, as Markdown, CSV and JSON, beside the paper's Table 5."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from gecar.results.cells import Cell, difference_p
+from gecar.results.study import TABLE_5, Planned, Study
+
+PAPER_TABLE_5: Mapping[tuple[float, float], float] = {
+    (0.4, 0.03): math.inf, (0.4, 0.05): math.inf, (0.4, 0.07): 22.51,
+    (0.5, 0.03): 22.32, (0.5, 0.05): 16.74, (0.5, 0.07): 17.20,
+    (0.7, 0.03): 28.64, (0.7, 0.05): 16.98, (0.7, 0.07): 18.74,
+}  # fmt: skip
+"""Mean of the best in the last generation over five runs by crossover and mutation rate [s]; inf: did not converge."""
+
+_HEADINGS = (
+    "runs", "at GOAL", "mean [s]", "median [s]", "best to worst [s]", "sd [s]", "evaluations", "simulated",
+)  # fmt: skip
+_RUN_COLUMNS = (
+    "fitness_s", "solved", "found_in_generation", "evaluations", "distinct_evaluations", "simulated_steps", "wall_s",
+)  # fmt: skip
+
+
+def paper_figures(study: Study, runs: Sequence[Planned]) -> Mapping[tuple[float, float], float]:
+    """Return the paper's figures where the study asks what the paper asked: its rates, on its course."""
+    names = tuple(axis.name for axis in TABLE_5)
+    same = all(run.config.course == "paper" and run.config.grammar == "paper" for run in runs)
+    return PAPER_TABLE_5 if same and (study.rows.name, study.columns.name) == names else {}
+
+
+def of_paper(cell: Cell, paper: Mapping[tuple[float, float], float]) -> float | None:
+    """Return the paper's figure for a cell [s]; None where it has none."""
+    return paper.get((cell.row, cell.column)) if paper else None
+
+
+def terminal_table(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> Table:
+    """Return the table for people."""
+    table = Table(*_heads(study, paper), box=None, pad_edge=False, header_style="bold")
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for cell in cells:
+        table.add_row(*_words(cell, paper))
+    return table
+
+
+def markdown(
+    study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float], about: str
+) -> str:
+    """Write the table as Markdown: in the paper's form first, then all figures.
+
+    Parameters
+    ----------
+    study, cells
+        What was varied, and what came of it.
+    paper
+        The paper's figures, or none.
+    about
+        One line on what stayed.
+    """
+    blocks = [f"# {_letters(study)}", about, _matrix(study, cells, paper), _full(study, cells, paper)]
+    p = difference_p(cells)
+    if p is not None:
+        blocks.append(f"Do the cells differ at all? Kruskal-Wallis: p = {p:.2g}.")
+    return "\n\n".join(blocks) + "\n"
+
+
+def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
+    """Write a row for each cell as CSV; empty where there is no number, inf where GOAL was not reached."""
+    stream = io.StringIO()
+    out = csv.writer(stream, lineterminator="\n")
+    out.writerow([study.rows.name, study.columns.name, *cells[0].figures(), *(["paper_s"] if paper else [])])
+    for cell in cells:
+        figures = [*cell.figures().values(), *([of_paper(cell, paper)] if paper else [])]
+        out.writerow([cell.row, cell.column, *map(_csv, figures)])
+    return stream.getvalue()
+
+
+def runs_csv(study: Study, cells: Sequence[Cell]) -> str:
+    """Write a row for each run as CSV."""
+    stream = io.StringIO()
+    out = csv.writer(stream, lineterminator="\n")
+    out.writerow([study.rows.name, study.columns.name, "seed", *_RUN_COLUMNS, "program"])
+    for cell in cells:
+        for record in cell.records:
+            figures = [_csv(record[name]) for name in _RUN_COLUMNS]
+            out.writerow([cell.row, cell.column, record["seed"], *figures, record["program"]])
+    return stream.getvalue()
+
+
+def as_table(
+    study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]
+) -> dict[str, Any]:
+    """Return the table for JSON; null where there is no number, or GOAL was not reached."""
+    return {
+        "rows": {study.rows.name: list(study.rows.values)},
+        "columns": {study.columns.name: list(study.columns.values)},
+        "seeds": list(study.seeds),
+        "difference_p": difference_p(cells),
+        "cells": [
+            {
+                study.rows.name: cell.row,
+                study.columns.name: cell.column,
+                **{name: _number(value) for name, value in cell.figures().items()},
+                **({"paper_s": _number(of_paper(cell, paper))} if paper else {}),
+            }
+            for cell in cells
+        ],
+    }
+
+
+def setting_words(name: str) -> str:
+    """Return a setting's name as people say it."""
+    return name.replace("_", " ")
+
+
+def seconds(value: float) -> str:
+    """Return a time as the paper writes it: two decimals, and a dash where GOAL was not reached."""
+    return f"{value:.2f}" if math.isfinite(value) else "-"
+
+
+def _letters(study: Study) -> str:
+    rows, columns = setting_words(study.rows.name), setting_words(study.columns.name)
+    return f"{rows.capitalize()} x {columns}, {len(study.seeds)} seeds"
+
+
+def _heads(study: Study, paper: Mapping[tuple[float, float], float]) -> list[str]:
+    names = [setting_words(study.rows.name), setting_words(study.columns.name)]
+    return [*names, *_HEADINGS, *(["paper [s]"] if paper else [])]
+
+
+def _words(cell: Cell, paper: Mapping[tuple[float, float], float]) -> list[str]:
+    figures = cell.figures()
+    words = [str(cell.row), str(cell.column), str(figures["runs"])]
+    if not cell.records:
+        return words + [""] * (len(_HEADINGS) - 1 + bool(paper))
+    spread = f"{seconds(figures['best_s'])} to {seconds(figures['worst_s'])}"
+    words += [
+        f"{cell.solved}/{figures['runs']}",
+        seconds(figures["mean_s"]),
+        seconds(figures["median_s"]),
+        spread,
+    ]
+    words += [
+        seconds(figures["sd_solved_s"]),
+        f"{figures['evaluations']:,.0f}",
+        f"{figures['simulated']:,.0f}",
+    ]
+    value = of_paper(cell, paper)
+    return words + ([seconds(value) if value is not None else ""] if paper else [])
+
+
+def _matrix(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
+    """Write the means in the paper's form, its own figures in brackets."""
+    by_place = {(str(cell.row), str(cell.column)): cell for cell in cells}
+    corner = f"{setting_words(study.rows.name)} \\ {setting_words(study.columns.name)}"
+    lines = [[corner, *map(str, study.columns.values)]]
+    for row in study.rows.values:
+        shown = [str(row)]
+        for column in study.columns.values:
+            cell = by_place[str(row), str(column)]
+            value = of_paper(cell, paper)
+            shown.append(seconds(cell.mean_s) + (f" ({seconds(value)})" if value is not None else ""))
+        lines.append(shown)
+    note = "Mean of the best time to GOAL over the seeds [s]; a dash where a run did not get there"
+    return _piped(lines) + f"\n\n{note}{'; in brackets the paper' if paper else ''}."
+
+
+def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
+    note = (
+        "A run without GOAL counts as slower than any in mean, median and worst; sd is of the runs at GOAL. "
+        "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
+    )
+    return _piped([_heads(study, paper), *(_words(cell, paper) for cell in cells)]) + f"\n\n{note}"
+
+
+def _piped(lines: Sequence[Sequence[str]]) -> str:
+    head, *rest = (f"| {' | '.join(line)} |" for line in lines)
+    rule = "|" + "|".join(["---"] * len(lines[0])) + "|"
+    return "\n".join([head, rule, *rest])
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
+
+
+def _csv(value: Any) -> Any:
+    return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value

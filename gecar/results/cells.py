@@ -1,0 +1,109 @@
+"""What the runs of a study came to, cell by cell of its grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from gecar.results.study import Planned
+from gecar.search.fitness import UNSOLVED
+
+Floats = npt.NDArray[np.float64]
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The runs at one place of the grid.
+
+    Attributes
+    ----------
+    row, column
+        The settings' values.
+    records
+        Finished runs, by seed.
+    """
+
+    row: Any
+    column: Any
+    records: tuple[Record, ...]
+
+    @property
+    def times_s(self) -> Floats:
+        """Best time to GOAL of each run [s], inf where none got there, shape (runs,)."""
+        return np.array([r["fitness_s"] if r["solved"] else np.inf for r in self.records], float)
+
+    @property
+    def solved(self) -> int:
+        """How many runs reached GOAL."""
+        return int(np.isfinite(self.times_s).sum())
+
+    @property
+    def mean_s(self) -> float:
+        """Mean over all runs [s], as in the paper's Table 5; inf where a run did not reach GOAL."""
+        return float(self.times_s.mean()) if self.records else float("nan")
+
+    @property
+    def bests_s(self) -> Floats:
+        """Best fitness of each run by generation [s], shape (runs, generations + 1)."""
+        return np.array([record["history"]["best"] for record in self.records], float)
+
+    @property
+    def generation(self) -> Floats:
+        """Numbers of the generations, shape (generations + 1,)."""
+        return np.array(self.records[0]["history"]["generation"], float)
+
+    def quantile_s(self, share: float) -> float:
+        """Return a quantile of the times [s]; a run without GOAL counts as slower than any."""
+        return float(np.quantile(self.times_s, share, method="higher")) if self.records else float("nan")
+
+    def figures(self) -> dict[str, Any]:
+        """Sum up: runs, solved and times [s]; inf where too few runs reached GOAL, nan where none is finished."""
+        times = self.times_s[np.isfinite(self.times_s)]
+        return {
+            "runs": len(self.records),
+            "solved": self.solved,
+            "solved_share": self.solved / len(self.records) if self.records else float("nan"),
+            "mean_s": self.mean_s,
+            "median_s": self.quantile_s(0.5),
+            "sd_solved_s": float(times.std(ddof=1)) if len(times) > 1 else float("nan"),
+            "mean_solved_s": float(times.mean()) if len(times) else float("nan"),
+            "best_s": self.quantile_s(0.0),
+            "lower_quarter_s": self.quantile_s(0.25),
+            "upper_quarter_s": self.quantile_s(0.75),
+            "worst_s": self.quantile_s(1.0),
+            "evaluations": self._median("evaluations"),
+            "simulated": self._median("distinct_evaluations"),
+            "simulated_steps": self._median("simulated_steps"),
+            "wall_s": self._median("wall_s"),
+        }
+
+    def _median(self, name: str) -> float:
+        return float(np.median([r[name] for r in self.records])) if self.records else float("nan")
+
+
+def cells_of(runs: Sequence[Planned], records: Sequence[Record | None]) -> list[Cell]:
+    """Gather a study's runs into cells, row by row; runs not finished (None) are left out."""
+    found: dict[tuple[str, str], tuple[Any, Any, list[Record]]] = {}
+    for run, record in zip(runs, records, strict=True):
+        place = found.setdefault((str(run.row), str(run.column)), (run.row, run.column, []))
+        if record is not None:
+            place[2].append(record)
+    return [Cell(row, column, tuple(kept)) for row, column, kept in found.values()]
+
+
+def difference_p(cells: Sequence[Cell]) -> float | None:
+    """Return the probability of differences this large between cells if the settings made none.
+
+    Kruskal and Wallis (1952), on ranks, so that a run without GOAL is simply the slowest. None for less than two cells
+    with two runs.
+    """
+    groups = [np.minimum(cell.times_s, UNSOLVED) for cell in cells if len(cell.records) > 1]
+    if len(groups) < 2 or len(set(np.concatenate(groups))) < 2:
+        return None
+    return float(stats.kruskal(*groups).pvalue)
