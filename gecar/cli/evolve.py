@@ -58,6 +58,16 @@ def evolve(
     robot: RobotOption = None,
     noise: NoiseOption = None,
     motor_noise: MotorNoiseOption = None,
+    robust: Annotated[
+        int | None,
+        typer.Option("--robust", metavar="K", show_default="0", rich_help_panel=SEARCH,
+                     help="Perturbed robots a program must bring to GOAL beside the nominal one."),
+    ] = None,
+    robust_by: Annotated[
+        str | None,
+        typer.Option("--robust-by", metavar="mean|worst", help="Which of their times is the fitness.",
+                     show_default="mean", rich_help_panel=SEARCH),
+    ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
     seed: Annotated[
@@ -103,6 +113,7 @@ def evolve(
     options = {
         "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
         "time_limit_s": time_limit, "engine": engine, "noise": noise, "motor_noise": motor_noise, "wraps": wraps,
+        "robust": robust, "robust_by": robust_by,
     }  # fmt: skip
     changes = given(options) | {"search": given(search) | settings(setting or [])}
     from gecar.cli.running import begin, run_to_the_end

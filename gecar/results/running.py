@@ -23,6 +23,7 @@ from gecar.search.evaluation import DriveEvaluator
 from gecar.search.evolution import Evolution, noise_seed, rehearse, run
 from gecar.search.executors import open_executor
 from gecar.search.history import Generation
+from gecar.search.robust import RobustEvaluator
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
@@ -43,8 +44,12 @@ class Task:
         return identify(self.config, self.fingerprints)
 
     @property
-    def evaluator(self) -> DriveEvaluator:
+    def evaluator(self) -> DriveEvaluator | RobustEvaluator:
         """What scores programs."""
+        config = self.config
+        if config.robust > 0:
+            arrivals = config.search.needs_arrivals
+            return RobustEvaluator(self.world, config.robust, config.robust_by, config.seed, arrivals)
         return DriveEvaluator(self.world, self.config.search.needs_arrivals)
 
     def evolution(self) -> Evolution:
@@ -201,7 +206,6 @@ def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:
     if best.program is None:
         return False
     seed = noise_seed(evolution.seed, best.program)
+    own = simulate(task.world, best.program.opcodes, seed)
     drive = simulate(replace(task.world, engine="pymunk"), best.program.opcodes, seed)
-    score = best.score[0]
-    near = abs(drive.time_s - float(score["time_s"])) <= 1.5 * task.config.step_s
-    return bool(drive.outcome == score["outcome"] and near)
+    return drive.outcome == own.outcome and abs(drive.time_s - own.time_s) <= 1.5 * task.config.step_s
