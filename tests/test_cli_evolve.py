@@ -167,7 +167,7 @@ def test_plot_of_what_is_no_run_is_one_line(gecar, words):
     assert "config.toml" in gecar.error("plot", *words)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is no signal there")
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_a_run_that_is_stopped_is_saved_and_goes_on_to_the_same_end(gecar, tmp_path):
     """Ctrl-C on the command and its workers, as a terminal sends it."""
     small = ("--population", "40", "--generations", "60", "--workers", "2", "--no-pictures")
@@ -196,11 +196,29 @@ def _wait_for(condition, process, seconds=90.0):
 
 
 def _lives(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
+    """Whether a process group has a process that is more than a dead one's record."""
+    stats = [
+        path.read_text().rpartition(")")[2].split()
+        for path in Path("/proc").glob("[0-9]*/stat")
+        if path.exists()
+    ]
+    return any(int(stat[2]) == group and stat[0] != "Z" for stat in stats)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
+@pytest.mark.parametrize("seconds", [0.6, 1.5, 3.0])
+def test_ctrl_c_at_any_moment_ends_all_in_one_line(tmp_path, seconds):
+    process = start(
+        "evolve", "--generations", 2000, "--workers", 2, "--out", "new", cwd=tmp_path, start_new_session=True
+    )
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    # Python ends by the signal itself if that fell into its own exec(); to a shell both are 130.
+    assert process.returncode in (130, -signal.SIGINT), said
+    assert "Traceback" not in said
+    assert said.count("stopped") == 1
+    _wait_for(lambda: not _lives(process.pid), None)
 
 
 def test_progress_says_all_that_matters():

@@ -10,8 +10,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from multiprocessing.context import BaseContext
 from typing import Any
 
@@ -73,6 +74,7 @@ def open_executor(kind: str, workers: int) -> Executor:
     if kind == "serial" or (kind == "process" and workers == 1):
         return SerialExecutor()
     if kind == "process":
+        prepare_workers()
         return ProcessPoolExecutor(workers, mp_context=_context(), initializer=start_worker)
     if kind == "thread":
         return ThreadPoolExecutor(workers)
@@ -88,7 +90,21 @@ def prepare_workers() -> None:
     if _context().get_start_method() == "forkserver":
         from multiprocessing import forkserver  # noqa: PLC0415  not there on every system
 
-        forkserver.ensure_running()
+        with _sigint_ignored():
+            forkserver.ensure_running()
+
+
+@contextmanager
+def _sigint_ignored() -> Iterator[None]:
+    """Let processes started within ignore Ctrl-C, which is for this one to answer; only the main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _context() -> BaseContext:
