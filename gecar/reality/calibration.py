@@ -1,0 +1,325 @@
+"""Calibrate: fit a robot's own constants to recordings, say which of them the recordings can not tell.
+
+result = calibrate(read_case("recordings/monday"))
+write_robot(result.robot, Path("robot.toml"))
+
+A constant is fitted where the recordings tell it from those already fitted. What moves the robot is fitted first, on
+its commands replayed open loop; then what the colour sensor reads, along the measured path.
+
+Sources: identifiability by the sensitivities' condition, Ljung, System Identification (2nd ed.), ch. 4 and 13;
+intervals by the delete-a-group jackknife with Student's t, Efron and Tibshirani, An Introduction to the Bootstrap
+(1993), ch. 11, in its linearised form (CR3), MacKinnon and White, Journal of Econometrics 29 (1985).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from gecar.reality.comparison import Comparison, Strip
+from gecar.reality.constants import Constant, Slack, chosen, with_constants
+from gecar.reality.fitting import fit, jacobian, weights
+from gecar.reality.holdout import Misfit, Split, judge, split
+from gecar.reality.noise import Noise, estimate_noise
+from gecar.reality.recording import Case, Recording
+from gecar.world.course import Course, load_course
+from gecar.world.robot import Robot, load_robot
+
+Array = npt.NDArray[np.float64]
+
+MEMORY_S = 1.0
+SPAN_S = 2.0  # of a recording is one group of the jackknife, where recordings are few
+FEWEST_GROUPS = 5
+PROBE = 0.4  # of a step, for differences
+# A constant whose effect is that of others to within this sine of an angle can not be told from them.
+LEAST_SINE = 0.1
+# Nor is one worth a number whose interval reaches further than so many of its steps either way.
+WIDEST_STEPS = 25.0
+# What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
+TRUST_STEPS = 0.15
+ROUNDS = 4
+BLIND = "nothing in these recordings depends on it"
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A constant as fitted, with its 95 % interval."""
+
+    constant: Constant
+    nominal: float
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A constant these recordings do not tell, and why; it keeps its nominal value."""
+
+    constant: Constant
+    nominal: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a calibration came to.
+
+    Attributes
+    ----------
+    case, robot
+        The case's name, and the robot with its new constants.
+    fitted, unknown
+        Constants fitted, and those the recordings do not tell.
+    fitted_on, held
+        Names of recordings.
+    by_time
+        Whether the last part of the only recording is what is held out.
+    channels
+        NRMSE on what is held out, by column of the file.
+    recordings
+        The same by recording, those fitted on included; only columns that move.
+    """
+
+    case: str
+    robot: Robot
+    fitted: tuple[Fitted, ...]
+    unknown: tuple[Unknown, ...]
+    fitted_on: tuple[str, ...]
+    held: tuple[str, ...]
+    by_time: bool
+    channels: Mapping[str, Misfit]
+    recordings: Mapping[str, Mapping[str, Misfit]]
+
+
+def calibrate(
+    case: Case,
+    holdout: Sequence[str] = (),
+    robot: Robot | None = None,
+    names: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+) -> Calibration:
+    """Fit a robot's own constants.
+
+    Parameters
+    ----------
+    case
+        Recordings of one robot.
+    holdout
+        Names of the recordings to judge on; default: every fourth, or the last part of the only one.
+    robot
+        Where to start; default: what the recordings name.
+    names
+        Constants to fit; default: the usual ones.
+    tell
+        Called with a line of progress.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or a robot or course file is wrong.
+    """
+    constants, parts = chosen(names), split(case, holdout)
+    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
+    noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
+    strips = _strips(parts.fitted, noise)
+    tell(f"fitting on {', '.join(r.name for r in parts.fitted)}")
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        motion = Comparison(strips, False, pool)
+        moved = _settle(motion, known, tuple(c for c in constants if not c.sight))
+        better = _taken(known, moved)
+        sight = Comparison(strips, True, pool)
+        sight.set_path(better.physics)
+        seen = _settle(sight, better, tuple(c for c in constants if c.sight))
+    calibrated = with_constants(
+        better, {f.constant.name: f.value for f in seen.fitted}, f"{known.name}-{case.name}"
+    )
+    tell("judging on recordings that were held out")
+    channels, each = _judged(parts, noise, known, calibrated)
+    return Calibration(
+        case.name, calibrated, moved.fitted + seen.fitted, moved.unknown + seen.unknown,
+        tuple(r.name for r in parts.fitted), tuple(r.name for r in parts.held), parts.by_time, channels, each,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Settled:
+    fitted: tuple[Fitted, ...]
+    unknown: tuple[Unknown, ...]
+
+
+def _taken(robot: Robot, settled: _Settled) -> Robot:
+    return with_constants(robot, {f.constant.name: f.value for f in settled.fitted})
+
+
+def _strips(recordings: Sequence[Recording], noise: Noise) -> list[Strip]:
+    return [
+        Strip(r, noise, np.inf if r.setup.rig == "bench" else MEMORY_S, _course_of(r)) for r in recordings
+    ]
+
+
+def _course_of(recording: Recording) -> Course | None:
+    setup = recording.setup
+    return load_course(setup.course) if setup.rig == "floor" and setup.course != "none" else None
+
+
+def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...]) -> _Settled:
+    """Fit the constants a comparison tells; which they are is asked again where the fit ended."""
+    everything = Slack(robot, constants)
+    z = np.zeros(len(constants))
+    told, reasons = np.zeros(len(constants), bool), dict.fromkeys(range(len(constants)), BLIND)
+    if not constants or not comparison.strips or not len(comparison.errors(robot.physics)):
+        return _Settled(
+            (),
+            tuple(Unknown(c, float(v), BLIND) for c, v in zip(constants, everything.standing, strict=True)),
+        )
+    pressed: dict[int, str] = {}
+    for _ in range(ROUNDS):
+        found, reasons = _telling(comparison, everything, z, pressed)
+        if (found == told).all():
+            break
+        told = found
+        z = _fitted(comparison, everything, told)
+        pressed |= _pressed(everything, z, told)
+    spread = _spread(comparison, everything, z, told)
+    values = everything.values(z)
+    ends = [
+        np.clip(everything.values(z + side * spread), [c.low for c in constants], [c.high for c in constants])
+        for side in (-1, 1)
+    ]
+    return _Settled(
+        tuple(Fitted(c, float(everything.standing[k]), float(values[k]), float(ends[0][k]), float(ends[1][k]))
+              for k, c in enumerate(constants) if told[k]),
+        tuple(Unknown(c, float(everything.standing[k]), reasons[k]) for k, c in enumerate(constants) if not told[k]),
+    )  # fmt: skip
+
+
+def _slopes(comparison: Comparison, slack: Slack, z: Array) -> tuple[Array, Array]:
+    """Return (residuals, their derivatives), each times the root of its robust weight."""
+    errors = comparison.errors(slack.physics(z))
+    high = slack.bounds[1]
+    slopes = jacobian(lambda v: comparison.errors(slack.physics(v)), z, errors, np.full(len(z), PROBE), high)
+    root = np.sqrt(weights(errors))
+    return errors * root, slopes * root[:, None]
+
+
+def _fitted(comparison: Comparison, slack: Slack, told: npt.NDArray[np.bool_]) -> Array:
+    """Fit the constants told, the others at their nominal values."""
+
+    def whole(part: Array) -> Array:
+        z = np.zeros(len(told))
+        z[told] = part
+        return z
+
+    if not told.any():
+        return np.zeros(len(told))
+    low, high = slack.bounds
+    ended = fit(
+        lambda part: comparison.errors(slack.physics(whole(part))),
+        np.zeros(int(told.sum())),
+        (low[told], high[told]),
+        np.full(int(told.sum()), PROBE),
+        rounds=20,
+    )
+    return whole(ended.z)
+
+
+def _pressed(slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> dict[int, str]:
+    """Return the constants a fit pressed against a bound, which is no measurement of them."""
+    low, high = slack.bounds
+    at = [k for k in np.flatnonzero(told) if not low[k] + 1e-6 < z[k] < high[k] - 1e-6]
+    return {
+        int(k): f"it fits best at its bound, {slack.values(z)[k]:g} {slack.constants[k].unit}" for k in at
+    }
+
+
+def _telling(
+    comparison: Comparison, slack: Slack, z: Array, pressed: Mapping[int, str]
+) -> tuple[npt.NDArray[np.bool_], dict[int, str]]:
+    """Return which constants the recordings tell, and of the others why not.
+
+    One by one, in the order they are trusted: what its sensitivity has that no combination of those before it has.
+    """
+    errors, slopes = _slopes(comparison, slack, z)
+    # Residuals larger than noise make constants less certain than noise alone would.
+    size = max(float(np.sqrt(np.mean(errors**2))), 1.0)
+    told, reasons = np.zeros(len(z), bool), dict(pressed)
+    for k, constant in enumerate(slack.constants):
+        if k in pressed:
+            continue
+        column, taken = slopes[:, k], slopes[:, told]
+        whole = float(np.linalg.norm(column))
+        if whole < 1e-6:
+            reasons[k] = BLIND
+            continue
+        along = np.linalg.lstsq(taken, column, rcond=None)[0] if taken.size else np.zeros(0)
+        own = float(np.linalg.norm(column - taken @ along)) if taken.size else whole
+        if own < LEAST_SINE * whole:
+            reasons[k] = f"it does what {_named(slack, told, along * np.linalg.norm(taken, axis=0))} does"
+        elif 2.0 * size / own > WIDEST_STEPS:
+            reasons[k] = (
+                f"known only to ± {2.0 * size / own * constant.step:.2g} {constant.unit}".removesuffix(" -")
+            )
+        else:
+            told[k] = True
+    return told, reasons
+
+
+def _named(slack: Slack, told: npt.NDArray[np.bool_], shares: Array) -> str:
+    """Name the constants that carry at least a tenth of the largest share."""
+    names = [c.words for c, taken in zip(slack.constants, told, strict=True) if taken]
+    large = np.abs(shares) >= 0.1 * np.abs(shares).max()
+    return " with ".join(name for name, is_large in zip(names, large, strict=True) if is_large)
+
+
+def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> Array:
+    """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of a few."""
+    errors, slopes = _slopes(comparison, slack, z)
+    slopes = slopes[:, told]
+    groups = _groups(comparison)
+    normal = slopes.T @ slopes
+    leaps = []
+    for group in np.unique(groups):
+        rows = groups == group
+        part = normal - slopes[rows].T @ slopes[rows]
+        leaps.append(np.linalg.pinv(part, hermitian=True) @ (slopes[rows].T @ errors[rows]))
+    count = len(leaps)
+    variance = (count - 1) / count * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
+    out = np.zeros(len(z))
+    out[told] = np.hypot(student.ppf(0.975, count - 1) * np.sqrt(variance), TRUST_STEPS)
+    return out
+
+
+def _groups(comparison: Comparison) -> npt.NDArray[np.int64]:
+    """Return each residual's group: its recording, or where those are few, a span of it."""
+    cells = comparison.cells
+    recording = cells.recording.astype(np.int64)
+    if len(np.unique(recording)) >= FEWEST_GROUPS:
+        return recording
+    span = (cells.t_s / SPAN_S).astype(np.int64)
+    return recording * (span.max() + 1) + span
+
+
+def _judged(
+    parts: Split, noise: Noise, before: Robot, after: Robot
+) -> tuple[dict[str, Misfit], dict[str, dict[str, Misfit]]]:
+    """Return misfits over what is held out, and of each recording, by column."""
+    with ThreadPoolExecutor(1) as pool:
+        strips = {r.name: s for r, s in zip(parts.held, _strips(parts.held, noise), strict=True)}
+        if not parts.by_time:
+            strips |= {r.name: s for r, s in zip(parts.fitted, _strips(parts.fitted, noise), strict=True)}
+        Comparison(list(strips.values()), True, pool).set_path(after.physics)
+        everyone = parts.held if parts.by_time else (*parts.fitted, *parts.held)
+        each = {r.name: _moving(r, judge([r], [strips[r.name]], noise, before, after)) for r in everyone}
+        return judge(parts.held, [strips[r.name] for r in parts.held], noise, before, after), each
+
+
+def _moving(recording: Recording, misfits: dict[str, Misfit]) -> dict[str, Misfit]:
+    """Leave out columns that stand still: their misfit has nothing to be a share of."""
+    return {column: m for column, m in misfits.items() if m.floor < 1.0 and recording.duration_s > 0.0}

@@ -1,0 +1,88 @@
+"""A calibration in words, and as a table for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gecar.reality.calibration import BLIND, Calibration, Fitted
+from gecar.reality.holdout import Misfit
+
+
+def calibration_lines(result: Calibration) -> list[str]:
+    """Say what was fitted, what the recordings do not tell, and how well the robot does on recordings held out."""
+    lines = [fitted_line(fitted) for fitted in result.fitted]
+    lines += [
+        f"{u.constant.name} stays {_number(u.nominal, u.constant.unit)}: {u.why}."
+        for u in result.unknown
+        if u.why != BLIND
+    ]
+    blind = ", ".join(u.constant.name for u in result.unknown if u.why == BLIND)
+    if blind:
+        lines.append(f"Not identifiable, {BLIND.replace(' it', ' them')}: {blind}.")
+    if result.channels:
+        where = (
+            "the part held out" if result.by_time else f"the recordings held out ({', '.join(result.held)})"
+        )
+        lines.append(f"NRMSE on {where}, before and after: {channels_words(result)}.")
+    return lines
+
+
+def fitted_line(fitted: Fitted) -> str:
+    """Say what a constant was and is, with its 95 % interval."""
+    unit = fitted.constant.unit
+    interval = f"{round_off(fitted.low, fitted)} to {round_off(fitted.high, fitted)}"
+    return (
+        f"{fitted.constant.name}: {_number(fitted.nominal, unit)} -> "
+        f"{round_off(fitted.value, fitted)}{_of(unit)} (95 %: {interval})"
+    )
+
+
+def channels_words(result: Calibration) -> str:
+    """Return the misfits on what was held out, column by column."""
+    return ", ".join(f"{name} {m.before:.4f} -> {m.after:.4f}" for name, m in result.channels.items())
+
+
+def round_off(value: float, fitted: Fitted) -> str:
+    """Return a number with the digits its interval allows, and one more."""
+    reach = max(fitted.high - fitted.low, 1e-12)
+    places = max(1 - math.floor(math.log10(reach)), 0)
+    return f"{value:.{min(places, 8)}f}"
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:g}{_of(unit)}"
+
+
+def _of(unit: str) -> str:
+    return "" if unit == "-" else f" {unit}"
+
+
+def calibration_table(result: Calibration) -> dict[str, Any]:
+    """Return a calibration's figures, ready for JSON."""
+    return {
+        "case": result.case,
+        "robot": result.robot.name,
+        "fitted_on": list(result.fitted_on),
+        "constants": {
+            f.constant.name: {
+                "nominal": f.nominal, "value": f.value, "low": f.low, "high": f.high, "unit": f.constant.unit,
+            }
+            for f in result.fitted
+        },
+        "not_identifiable": {
+            u.constant.name: {"nominal": u.nominal, "unit": u.constant.unit, "why": u.why} for u in result.unknown
+        },
+        "holdout": {
+            "recordings": list(result.held),
+            "by_time": result.by_time,
+            "channels": {name: _misfit(m) for name, m in result.channels.items()},
+        },
+        "recordings": {
+            name: {column: _misfit(m) for column, m in columns.items()} for name, columns in result.recordings.items()
+        },
+    }  # fmt: skip
+
+
+def _misfit(misfit: Misfit) -> dict[str, float]:
+    return {"before": misfit.before, "after": misfit.after, "floor": misfit.floor}
