@@ -9,7 +9,6 @@ from gecar.plots import style
 from gecar.plots.animation import FRAMES_PER_S, film
 from gecar.plots.compare_runs import compare_runs
 from gecar.plots.convergence import Reference, convergence
-from gecar.plots.listing import MOST_LINES
 from gecar.plots.path import by_line, every_distance, line_colours, speed_of
 from gecar.plots.trajectory import trajectory
 from gecar.world.course import load_course
@@ -19,7 +18,7 @@ from gecar.world.rollout import World, simulate
 EV3 = load_robot("ev3")
 SHORT = World(EV3, load_course("paper"), time_limit_s=2.0)
 LAPS = parse_program("if(SensorValue > 80):\n    motor(70,100,20)\nelse:\n    motor(-20,-80,170)")
-ENDLESS = parse_program("\n".join(f"motor({k % 90},{(k + 7) % 90},10)" for k in range(3 * MOST_LINES)))
+ENDLESS = parse_program("\n".join(f"motor({k % 90},{(k + 7) % 90},10)" for k in range(90)))
 REFERENCES = (Reference("the paper's best", 16.74), Reference("lower bound", 11.34))
 
 

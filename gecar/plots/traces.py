@@ -22,7 +22,7 @@ def draw_traces(axes: list[Axes], trace: Trace, colouring: Colouring, opcodes: n
     for threshold in _thresholds(opcodes):
         sensor.axhline(threshold, color=SOFT, linewidth=0.8, linestyle=(0, (4, 3)))
     sensor.set(ylabel="sensor [%]", ylim=(-6, 106), yticks=(0, 50, 100))
-    _pair(duty, t, 100 * trace["left_duty"], 100 * trace["right_duty"])
+    _pair(duty, t, 100 * trace["left_duty"], 100 * trace["right_duty"], "steps-post")
     duty.set(ylabel="duty [%]", ylim=(-112, 112), yticks=(-100, 0, 100))
     _pair(speed, t, _rate(t, trace["left_angle_rad"]), _rate(t, trace["right_angle_rad"]))
     speed.set(ylabel="wheel [°/s]", xlabel="time [s]")
@@ -47,10 +47,14 @@ def _strip(axes: Axes, t: npt.NDArray[np.float64], colouring: Colouring) -> None
 
 
 def _pair(
-    axes: Axes, t: npt.NDArray[np.float64], left: npt.NDArray[np.float64], right: npt.NDArray[np.float64]
+    axes: Axes,
+    t: npt.NDArray[np.float64],
+    left: npt.NDArray[np.float64],
+    right: npt.NDArray[np.float64],
+    drawn: str = "default",
 ) -> None:
-    axes.plot(t, left, color=BLUE, linewidth=1.0, label="left")
-    axes.plot(t, right, color=ORANGE, linewidth=1.0, label="right")
+    axes.plot(t, left, color=BLUE, linewidth=1.0, drawstyle=drawn, label="left")
+    axes.plot(t, right, color=ORANGE, linewidth=1.0, drawstyle=drawn, label="right")
 
 
 def _rate(t: npt.NDArray[np.float64], angle: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
