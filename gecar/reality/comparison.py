@@ -51,6 +51,7 @@ class Strip:
         self.raster = course.raster(course.pitch_m) if course is not None and self.looks else None
         self.pitch = course.pitch_m if course is not None else 1.0
         self.path, self.path_late = np.zeros((0, 3)), 0.0
+        self.path_colour = np.ones(3)
         self.reading_sd = np.full(len(seen), np.nan)
 
     def set_path(self, physics: npt.NDArray[Any]) -> None:
@@ -61,7 +62,7 @@ class Strip:
         self.path_late = float(physics["pose_delay"][0]) + self.film.offset_s
         middle = self._readings(physics, np.zeros(3))
         variance = np.full(len(middle), self.noise.reflection_sd**2)
-        for shift in np.diag(self.noise.path_sd):
+        for shift in np.diag(self.noise.path_sd * self.path_colour):
             variance += (0.5 * (self._readings(physics, shift) - self._readings(physics, -shift))) ** 2
         # One crossing of an edge is one event, however many samples it has.
         self.reading_sd = np.sqrt(variance)
@@ -130,8 +131,10 @@ class Comparison:
         self._keep: npt.NDArray[np.bool_] = np.zeros(0, np.bool_)
         self.replays = 0
 
-    def set_path(self, physics: npt.NDArray[Any]) -> None:
+    def set_path(self, physics: npt.NDArray[Any], colour: Array | None = None) -> None:
         """Base sight on the path as a model sees it."""
+        for strip in self.strips:
+            strip.path_colour = np.ones(3) if colour is None else np.sqrt(colour)
         list(self._pool.map(lambda strip: strip.set_path(physics), self.strips))
         self._keep = np.zeros(0, np.bool_)
 

@@ -35,6 +35,7 @@ from gecar.world.robot import Robot, load_robot
 Array = npt.NDArray[np.float64]
 
 MEMORY_S = 1.0
+POSES = (4, 5, 6)  # channels of the pose
 SIGHT = ("sensor_lag", "sensor_delay", "sensor_gain", "sensor_position", "spot_size", "line_shift")
 _MOTION = tuple(e.id for e in CATALOGUE if e.id not in SIGHT)
 # What a bench can not show: nothing touches the floor, and no camera looks.
@@ -55,6 +56,32 @@ _FLOOR_ONLY = frozenset(
     ]
 )
 _TWO_MOTORS = frozenset({"motor_gain_asymmetry"})
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a verdict rests on: selections and explanations of motion and of sight, for pictures and for the curious."""
+
+    motion: Selection
+    moved: Explanation
+    sight: Selection | None
+    seen: Explanation | None
+
+    def __str__(self) -> str:
+        words = [_told("motion", self.motion, self.moved)]
+        if self.sight is not None and self.seen is not None:
+            words.append(_told("sight", self.sight, self.seen))
+        return "; ".join(words)
+
+
+def _told(name: str, selection: Selection, explained: Explanation) -> str:
+    blocks = max(selection.blocks, 1)
+    tried = [
+        f"{s.effect}{'' if s.worthwhile else '-'} {s.gain:.0f}/{s.model.structure / blocks:.2f}"
+        for s in (explained.tried[-1][:3] if explained.tried else ())
+    ]
+    before, after = selection.bare.structure / blocks, explained.taken.structure / blocks
+    return f"{name} {before:.2f} -> {after:.2f} last tried: {', '.join(tried)}"
 
 
 @dataclass
@@ -107,10 +134,11 @@ def discover(
         Comparison(shop.strips, False, shop.pool), shop.robot, _seen(shop), shop.split.fitted, seed, tell
     )
     moved = explain(motion)
-    sight, seen = _look(shop, moved)
+    colour = motion.colour(motion.rid_of_subtle(moved.taken).fit.errors)[list(POSES)]
+    sight, seen = _look(shop, moved, colour)
     found_robot = shop.robot.with_effects({**moved.taken.values, **(seen.taken.values if seen else {})})
     tell("intervals, alternatives, whereabouts")
-    judgement = _judge(shop, found_robot)
+    judgement = _judge(shop, found_robot, colour)
     found = _found(shop, motion, moved, found_robot) + (
         _found(shop, sight, seen, found_robot) if sight and seen else ()
     )
@@ -133,6 +161,7 @@ def discover(
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
         notes=_notes(shop, motion),
+        evidence=Evidence(motion, moved, sight, seen),
     )
 
 
@@ -182,19 +211,20 @@ def _seen(shop: _Workshop) -> tuple[str, ...]:
     return tuple(e for e in _MOTION if e not in hidden)
 
 
-def _look(shop: _Workshop, moved: Explanation) -> tuple[Selection | None, Explanation | None]:
+def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection | None, Explanation | None]:
     """Explain what the colour sensor saw along the measured path."""
     comparison = Comparison(shop.strips, True, shop.pool)
     if not comparison.strips:
         return None, None
-    comparison.set_path(moved.taken.freedom.physics(moved.taken.fit.z))
-    selection = Selection(comparison, shop.robot, SIGHT, shop.split.fitted, shop.seed, shop.tell)
+    comparison.set_path(moved.taken.freedom.physics(moved.taken.fit.z), colour)
+    known = shop.robot.with_effects(moved.taken.values)  # a late camera, a skewed clock shift what is seen, too
+    selection = Selection(comparison, known, SIGHT, shop.split.fitted, shop.seed, shop.tell)
     return selection, explain(selection)
 
 
-def _judge(shop: _Workshop, found: Robot) -> Judgement:
+def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
     sight = Comparison(shop.held, True, shop.pool)
-    sight.set_path(found.physics)
+    sight.set_path(found.physics, colour)
     channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
     return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
 

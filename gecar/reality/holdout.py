@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -72,14 +73,15 @@ def split(case: Case, names: Sequence[str] = ()) -> Split:
 def _by_time(recording: Recording) -> Split:
     cut = recording.t_s[0] + FIRST_SHARE * recording.duration_s
     first = recording.t_s <= cut
-    series = {field: getattr(recording, field) for field, _ in COLUMNS.values()}
-    early = replace(recording, **{field: values[first] for field, values in series.items()})
-    late = {
-        f: np.where(first, np.nan, v)
-        for f, v in series.items()
-        if f not in ("t_s", "left_duty", "right_duty")
-    }
-    return Split((early,), (replace(recording, **late),), by_time=True)
+    early, late = recording, recording
+    for field, _ in COLUMNS.values():
+        values = getattr(recording, field)
+        kept: dict[str, Any] = {field: values[first]}
+        early = replace(early, **kept)
+        if field not in ("t_s", "left_duty", "right_duty"):
+            blanked: dict[str, Any] = {field: np.where(first, np.nan, values)}
+            late = replace(late, **blanked)
+    return Split((early,), (late,), by_time=True)
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> 
 
 
 def _after(event: Mask, length: int) -> Mask:
-    return np.convolve(event, np.ones(length))[: len(event)] > 0  # type: ignore[no-any-return]
+    return np.convolve(event, np.ones(length))[: len(event)] > 0
 
 
 def _risen(mask: Mask) -> Mask:
@@ -89,4 +89,4 @@ def _turned(speed: Array) -> Mask:
 def _edges(strip: Strip, physics: npt.NDArray[Any], at: npt.NDArray[np.intp]) -> Mask:
     readings = strip.readings(physics)
     slope = np.abs(np.gradient(readings))
-    return np.convolve(slope, np.ones(9), "same")[at] > 10.0  # type: ignore[no-any-return]
+    return np.convolve(slope, np.ones(9), "same")[at] > 10.0

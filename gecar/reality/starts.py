@@ -7,7 +7,7 @@ scanned: a slippery patch by place, a ripple by its cycles, a dead band by its e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +48,7 @@ def _sizes(c: Coordinate) -> Iterator[float]:
 
 def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
     for speed in (0.3, 1.0, 3.0):
-        for torque in (0.01, 0.03):
+        for torque in (0.005, 0.02):
             yield {"extra_torque_nm": torque * _torque_scale(robot), "speed_rad_s": speed}
 
 
@@ -100,7 +100,7 @@ def _positive(*labels_sizes: tuple[str, tuple[float, ...]]) -> list[Values]:
     return [{label: size} for label, sizes in labels_sizes for size in sizes]
 
 
-_SPECIAL = {
+_SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = {
     "static_friction": _static,
     "dead_band": _dead_band,
     "torque_ripple": _ripple,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting import weights
+from gecar.reality.fitting import cost, weights
 from gecar.reality.selection import Model, Selection
 from gecar.reality.verdict import Interval
 
@@ -14,6 +14,10 @@ Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96
 SYSTEMATIC = 0.02  # of an effect's size: against the 3D engine, fitted parameters come back within so much
 SYSTEMATIC_STEP = 0.15  # of the smallest size worth a name
+# Gears that give add to their play: 5 to 12 % there. Clipped readings bind gain and offset to each other.
+MORE_SYSTEMATIC = {"backlash": 0.12, "sensor_gain": 0.12, "sensor_offset": 0.2, "dead_band": 0.05}
+FLAT = 2.0  # coordinates: a deviation so large comes from slopes that say nothing
+NOTICED = 12.0  # of cost: what walking along a flat parameter must not raise it by
 
 
 def deviations(selection: Selection, model: Model) -> Array:
@@ -49,10 +53,28 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
     low, high = model.freedom.bounds
     for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
         z = float(model.fit.z[k])
-        size = SYSTEMATIC * abs(z) + (SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0)
-        reach = NORMAL_95 * float(np.hypot(min(sd, 1e3), 0.5 * size))
-        ends = sorted(c.value(float(end)) for end in np.clip((z - reach, z + reach), low[k], high[k]))
+        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + (SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0)
+        if sd > FLAT:
+            down, up = (_walked(selection, model, k, side, abs(end - z)) for side, end in ((-1.0, low[k]), (1.0, high[k])))
+        else:
+            down = up = NORMAL_95 * sd
+        reach = NORMAL_95 * 0.5 * size
+        edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
+        ends = sorted(c.value(float(end)) for end in edges)
         out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(
             c.value(z), ends[0], ends[1], c.parameter.unit
         )
     return out
+
+
+def _walked(selection: Selection, model: Model, k: int, side: float, most: float) -> float:
+    """Return how far one coordinate can go before the cost notices; the others stay."""
+    residual = selection.residual(model.freedom, model.shift)
+    gone, pace = 0.0, 0.25
+    while gone < most and pace < 64.0:
+        moved = model.fit.z.copy()
+        moved[k] += side * min(gone + pace, most)
+        if cost(residual(moved)) > model.cost + NOTICED:
+            return gone + pace
+        gone, pace = gone + pace, 1.5 * pace
+    return most
