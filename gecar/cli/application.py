@@ -51,10 +51,21 @@ class Seat:
         module, _, attribute = self.place.partition(":")
         found = getattr(import_module(f"gecar.cli.{module}"), attribute)
         if isinstance(found, typer.Typer):
-            return typer.main.get_command(found)
-        alone = typer.Typer(rich_markup_mode="rich", add_completion=False)
-        alone.command(self.name, no_args_is_help=False)(found)
-        return typer.main.get_command(alone)
+            command = typer.main.get_command(found)
+        else:
+            alone = typer.Typer(rich_markup_mode="rich", add_completion=False)
+            alone.command(self.name, no_args_is_help=False)(found)
+            command = typer.main.get_command(alone)
+        for each in (command, *getattr(command, "commands", {}).values()):
+            each.help = reflowed(each.help or "")
+        return command
+
+
+def reflowed(text: str) -> str:
+    """Join the lines of each paragraph, for the terminal to break; indented ones are examples and stay."""
+    paragraphs = (paragraph.splitlines() for paragraph in text.split("\n\n"))
+    joined = ("\n".join(p) if any(line.startswith(" ") for line in p) else " ".join(p) for p in paragraphs)
+    return "\n\n".join(joined)
 
 
 SEATS = (

@@ -12,7 +12,7 @@ from gecar.cli.voice import JsonOption, Voice
 
 def check(
     table: Annotated[
-        Path, typer.Argument(metavar="[TABLE.toml]", help="The fitness table; rows without figures are new.")
+        Path, typer.Argument(metavar="TABLE.toml", help="The fitness table; rows without figures are new.")
     ] = Path("benchmarks/fitness_table.toml"),
     update: Annotated[bool, typer.Option("--update", help="Write the fresh figures, and say what changed.")] = False,
     pins: Annotated[

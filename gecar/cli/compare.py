@@ -22,7 +22,7 @@ FRAMES = ("start", "course")
 def compare(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar="RECORDING...", show_default=False,
+        typer.Argument(metavar="RECORDING", show_default=False,
                        help="Recordings (.csv) of one program, or folders of them."),
     ],
     program: Annotated[

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from gecar.world.robot import Robot
 
 course = typer.Typer(
-    name="course", help="List, show, print and make courses.", no_args_is_help=True, rich_markup_mode="rich"
+    name="course",
+    help="List, show, print and make courses.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    add_completion=False,
 )
 
 NameArgument = Annotated[

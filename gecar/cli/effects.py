@@ -19,10 +19,10 @@ IdArgument = Annotated[
 
 
 def effects(effect: IdArgument = None, as_json: JsonOption = False) -> None:
-    r"""List the physics a simulation may have left out.
+    """List the physics a simulation may have left out.
 
-    Each is a group of parameters with neutral values at which it vanishes; in a robot file it is a section
-    [bold]\\[effects.ID][/]. A verdict of [bold]gecar discover[/] names them.
+    Each is a group of parameters with neutral values at which it vanishes. A robot file has a section for each
+    effect of its robot; the verdict of [bold]gecar discover[/] names them.
 
     [bold]Examples[/]
 

@@ -23,7 +23,7 @@ FILES, CAMERA, RUN = "What the files hold", "The camera", "What the recording is
 def import_(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", show_default=False,
+        typer.Argument(metavar="LOG", show_default=False,
                        help="The brick's log; and the camera's of the same run, if there is one, in any order."),
     ],
     out: Annotated[

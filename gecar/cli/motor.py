@@ -14,7 +14,7 @@ from gecar.cli.voice import JsonOption, Voice
 def motor(
     benches: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[FOLDER...]", show_default=False,
+        typer.Argument(metavar="FOLDER", show_default=False,
                        help="Recordings of motors on a bench, a folder for each motor."),
     ] = None,
     robot: RobotOption = None,

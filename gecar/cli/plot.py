@@ -10,7 +10,7 @@ import typer
 from gecar.cli.voice import JsonOption, Voice
 
 RunsArgument = Annotated[
-    list[Path], typer.Argument(metavar="RUN...", help="Folders that gecar evolve made.", show_default=False)
+    list[Path], typer.Argument(metavar="RUN", help="Folders that gecar evolve made.", show_default=False)
 ]
 
 

@@ -23,7 +23,7 @@ GRID, SEARCH, RUN = "Grid", "Search", "Run"
 def table(
     config: Annotated[
         Path | None,
-        typer.Argument(metavar="[CONFIG.toml]", show_default=False,
+        typer.Argument(metavar="CONFIG.toml", show_default=False,
                        help="Settings that all runs share, as for gecar evolve."),
     ] = None,
     rows: Annotated[
