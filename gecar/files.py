@@ -79,5 +79,5 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(read_text(path, what))
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # very deep nesting and very long numbers among them
         raise InputError(f"{path}: not TOML: {error}") from None
