@@ -20,6 +20,7 @@ grammar = typer.Typer(
     help="List, check and derive from grammars.",
     no_args_is_help=True,
     rich_markup_mode="rich",
+    add_completion=False,
 )
 
 GrammarArgument = Annotated[
