@@ -77,7 +77,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     InputError
         As `read_text`, or if it is not TOML; the message names the line.
     """
+    text = read_text(path, what)
     try:
-        return tomllib.loads(read_text(path, what))
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # very deep nesting and very long numbers among them
         raise InputError(f"{path}: not TOML: {error}") from None
