@@ -9,6 +9,7 @@ from typing import Any
 from gecar.cli.voice import Voice
 from gecar.cli.worlds import build_world, drive_seed, find_program, read_run_config
 from gecar.language.program import read_program
+from gecar.plots.classroom import write_classroom_page
 from gecar.plots.compare_runs import compare_runs
 from gecar.plots.convergence import Reference, convergence
 from gecar.plots.style import save
@@ -65,6 +66,22 @@ def draw_trajectory(folder: Path, target: Path) -> Path:
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
     title, detail = title_of(drive, world.course), detail_of(world, drive)
     return save(trajectory(world, program, drive, title=title, detail=detail), target)
+
+
+def write_drive_page(folder: Path, target: Path) -> Path:
+    """Write a page that plays the drive of a run's best program, as the run scored it.
+
+    Raises
+    ------
+    InputError
+        If the folder is no run's, or its run found no program.
+    """
+    file, settings = find_program(folder)
+    world, program = build_world(settings), read_program(file)
+    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+    return write_classroom_page(
+        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
+    )
 
 
 def references(config: Config) -> Sequence[Reference]:

@@ -71,6 +71,11 @@ def simulate(
     pace: Annotated[
         float, typer.Option("--pace", help="Seconds of driving in a second of film.", rich_help_panel=PICTURES)
     ] = 1.0,
+    page: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE", help="Write the drive as a page that plays it, for a classroom.",
+                     show_default=False, rich_help_panel=PICTURES),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Drive a program in the simulation; draw or film the drive.
@@ -79,6 +84,7 @@ def simulate(
 
       gecar simulate runs/evolve-001
       gecar simulate best.txt --course hairpin --animate drive.gif
+      gecar simulate best.txt --html drive.html
       gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
     """
     from gecar.cli.worlds import build_world, drive_seed, find_program
@@ -100,6 +106,7 @@ def simulate(
     voice.say(standing_of(world, drive))
     written = _draw(voice, world, loaded, drive, target, colour)
     written |= _film(voice, world, loaded, drive, animate, pace)
+    written |= _play(voice, world, loaded, drive, page)
     voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": which, **written})
 
 
@@ -147,3 +154,18 @@ def _film(
     film(world, program, drive, target, title=title_of(drive, world.course), pace=pace)
     voice.say(f"Film: {target}")
     return {"film": str(target)}
+
+
+def _play(voice: Voice, world: World, program: Program, drive: Drive, target: Path | None) -> dict[str, str]:
+    """Write the drive as a page if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.classroom import write_classroom_page
+    from gecar.report.drive import detail_of, title_of
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_classroom_page(
+        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
+    )
+    voice.say(f"Page: {target}")
+    return {"page": str(target)}
