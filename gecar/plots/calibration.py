@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from gecar.plots.style import BLUE, FAINT, GREEN, INK, LIGHT, SOFT, VERMILION, headline, look, new_figure
-from gecar.reality.calibration import BLIND, Calibration, Fitted, Unknown
-from gecar.report.calibration import round_off
+from gecar.reality.calibration import Calibration, Fitted, Unknown
+from gecar.reality.identifiable import BLIND
 
 ROW_IN = 0.27
 _POSE = ("x_m", "y_m", "heading_deg")
@@ -48,7 +48,7 @@ def _constants(axes: Axes, result: Calibration) -> None:
         axes.plot([low, high], [row, row], color=BLUE, linewidth=4.0, alpha=0.45)
         axes.plot(at, row, "o", color=BLUE, markersize=5)
         names.append(
-            f"{fitted.constant.words}  {round_off(fitted.value, fitted)} {fitted.constant.unit}".removesuffix(
+            f"{fitted.constant.words}  {fitted.rounded(fitted.value)} {fitted.constant.unit}".removesuffix(
                 " -"
             )
         )

@@ -13,6 +13,7 @@ intervals by the delete-a-group jackknife with Student's t, Efron and Tibshirani
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,8 +25,9 @@ from scipy.stats import t as student
 
 from gecar.reality.comparison import Comparison, Strip
 from gecar.reality.constants import Constant, Slack, chosen, with_constants
-from gecar.reality.fitting import fit, jacobian, weights
+from gecar.reality.fitting import fit
 from gecar.reality.holdout import Misfit, Split, judge, split
+from gecar.reality.identifiable import BLIND, PROBE, at_bounds, sensitivities, told_apart
 from gecar.reality.noise import Noise, estimate_noise
 from gecar.reality.recording import Case, Recording
 from gecar.world.course import Course, load_course
@@ -36,15 +38,9 @@ Array = npt.NDArray[np.float64]
 MEMORY_S = 1.0
 SPAN_S = 2.0  # of a recording is one group of the jackknife, where recordings are few
 FEWEST_GROUPS = 5
-PROBE = 0.4  # of a step, for differences
-# A constant whose effect is that of others to within this sine of an angle can not be told from them.
-LEAST_SINE = 0.1
-# Nor is one worth a number whose interval reaches further than so many of its steps either way.
-WIDEST_STEPS = 25.0
 # What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
 TRUST_STEPS = 0.15
 ROUNDS = 4
-BLIND = "nothing in these recordings depends on it"
 
 
 @dataclass(frozen=True)
@@ -56,6 +52,11 @@ class Fitted:
     value: float
     low: float
     high: float
+
+    def rounded(self, value: float) -> str:
+        """Return a number with the digits the interval allows, and one more."""
+        places = max(1 - math.floor(math.log10(max(self.high - self.low, 1e-12))), 0)
+        return f"{value:.{min(places, 8)}f}"
 
 
 @dataclass(frozen=True)
@@ -181,12 +182,12 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
         )
     pressed: dict[int, str] = {}
     for _ in range(ROUNDS):
-        found, reasons = _telling(comparison, everything, z, pressed)
+        found, reasons = told_apart(comparison, everything, z, pressed)
         if (found == told).all():
             break
         told = found
         z = _fitted(comparison, everything, told)
-        pressed |= _pressed(everything, z, told)
+        pressed |= at_bounds(everything, z, told)
     spread = _spread(comparison, everything, z, told)
     values = everything.values(z)
     ends = [
@@ -198,15 +199,6 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
               for k, c in enumerate(constants) if told[k]),
         tuple(Unknown(c, float(everything.standing[k]), reasons[k]) for k, c in enumerate(constants) if not told[k]),
     )  # fmt: skip
-
-
-def _slopes(comparison: Comparison, slack: Slack, z: Array) -> tuple[Array, Array]:
-    """Return (residuals, their derivatives), each times the root of its robust weight."""
-    errors = comparison.errors(slack.physics(z))
-    high = slack.bounds[1]
-    slopes = jacobian(lambda v: comparison.errors(slack.physics(v)), z, errors, np.full(len(z), PROBE), high)
-    root = np.sqrt(weights(errors))
-    return errors * root, slopes * root[:, None]
 
 
 def _fitted(comparison: Comparison, slack: Slack, told: npt.NDArray[np.bool_]) -> Array:
@@ -230,57 +222,9 @@ def _fitted(comparison: Comparison, slack: Slack, told: npt.NDArray[np.bool_]) -
     return whole(ended.z)
 
 
-def _pressed(slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> dict[int, str]:
-    """Return the constants a fit pressed against a bound, which is no measurement of them."""
-    low, high = slack.bounds
-    at = [k for k in np.flatnonzero(told) if not low[k] + 1e-6 < z[k] < high[k] - 1e-6]
-    return {
-        int(k): f"it fits best at its bound, {slack.values(z)[k]:g} {slack.constants[k].unit}" for k in at
-    }
-
-
-def _telling(
-    comparison: Comparison, slack: Slack, z: Array, pressed: Mapping[int, str]
-) -> tuple[npt.NDArray[np.bool_], dict[int, str]]:
-    """Return which constants the recordings tell, and of the others why not.
-
-    One by one, in the order they are trusted: what its sensitivity has that no combination of those before it has.
-    """
-    errors, slopes = _slopes(comparison, slack, z)
-    # Residuals larger than noise make constants less certain than noise alone would.
-    size = max(float(np.sqrt(np.mean(errors**2))), 1.0)
-    told, reasons = np.zeros(len(z), bool), dict(pressed)
-    for k, constant in enumerate(slack.constants):
-        if k in pressed:
-            continue
-        column, taken = slopes[:, k], slopes[:, told]
-        whole = float(np.linalg.norm(column))
-        if whole < 1e-6:
-            reasons[k] = BLIND
-            continue
-        along = np.linalg.lstsq(taken, column, rcond=None)[0] if taken.size else np.zeros(0)
-        own = float(np.linalg.norm(column - taken @ along)) if taken.size else whole
-        if own < LEAST_SINE * whole:
-            reasons[k] = f"it does what {_named(slack, told, along * np.linalg.norm(taken, axis=0))} does"
-        elif 2.0 * size / own > WIDEST_STEPS:
-            reasons[k] = (
-                f"known only to ± {2.0 * size / own * constant.step:.2g} {constant.unit}".removesuffix(" -")
-            )
-        else:
-            told[k] = True
-    return told, reasons
-
-
-def _named(slack: Slack, told: npt.NDArray[np.bool_], shares: Array) -> str:
-    """Name the constants that carry at least a tenth of the largest share."""
-    names = [c.words for c, taken in zip(slack.constants, told, strict=True) if taken]
-    large = np.abs(shares) >= 0.1 * np.abs(shares).max()
-    return " with ".join(name for name, is_large in zip(names, large, strict=True) if is_large)
-
-
 def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> Array:
     """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of a few."""
-    errors, slopes = _slopes(comparison, slack, z)
+    errors, slopes = sensitivities(comparison, slack, z)
     slopes = slopes[:, told]
     groups = _groups(comparison)
     normal = slopes.T @ slopes

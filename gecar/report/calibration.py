@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from gecar.reality.calibration import BLIND, Calibration, Fitted
+from gecar.reality.calibration import Calibration, Fitted
 from gecar.reality.holdout import Misfit
+from gecar.reality.identifiable import BLIND
 
 
 def calibration_lines(result: Calibration) -> list[str]:
@@ -31,23 +31,16 @@ def calibration_lines(result: Calibration) -> list[str]:
 def fitted_line(fitted: Fitted) -> str:
     """Say what a constant was and is, with its 95 % interval."""
     unit = fitted.constant.unit
-    interval = f"{round_off(fitted.low, fitted)} to {round_off(fitted.high, fitted)}"
+    interval = f"{fitted.rounded(fitted.low)} to {fitted.rounded(fitted.high)}"
     return (
         f"{fitted.constant.name}: {_number(fitted.nominal, unit)} -> "
-        f"{round_off(fitted.value, fitted)}{_of(unit)} (95 %: {interval})"
+        f"{fitted.rounded(fitted.value)}{_of(unit)} (95 %: {interval})"
     )
 
 
 def channels_words(result: Calibration) -> str:
     """Return the misfits on what was held out, column by column."""
     return ", ".join(f"{name} {m.before:.4f} -> {m.after:.4f}" for name, m in result.channels.items())
-
-
-def round_off(value: float, fitted: Fitted) -> str:
-    """Return a number with the digits its interval allows, and one more."""
-    reach = max(fitted.high - fitted.low, 1e-12)
-    places = max(1 - math.floor(math.log10(reach)), 0)
-    return f"{value:.{min(places, 8)}f}"
 
 
 def _number(value: float, unit: str) -> str:
