@@ -81,7 +81,7 @@ def test_a_reader_that_leaves_early_is_no_error():
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
 def test_ctrl_c_ends_with_one_word():
-    process = start("grammar", "map", "paper", "--count", "100000")
+    process = start("grammar", "map", "paper", "--count", "20000")
     process.stdout.readline()
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)

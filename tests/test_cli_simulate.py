@@ -76,6 +76,7 @@ def test_a_trace_does_not_change_the_drive():
         (("best.txt", "--no-picture", "--animate", "x.webm"), "x.webm"),
         (("broken.txt",), "broken.txt, line 1"),
         (("empty",), "best.txt"),
+        (("best.txt", "--out", "best.txt/below"), "best.txt"),
     ],
 )
 def test_bad_input_is_one_line(gecar, program, tmp_path, words, named):

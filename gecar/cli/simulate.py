@@ -76,6 +76,11 @@ def simulate(
         typer.Option("--html", metavar="FILE", help="Write the drive as a page that plays it, for a classroom.",
                      show_default=False, rich_help_panel=PICTURES),
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="FILE", show_default=False, rich_help_panel=PICTURES,
+                     help="Keep the drive as a recording (.csv), to rehearse what is done with a real robot's."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Drive a program in the simulation; draw or film the drive.
@@ -107,21 +112,24 @@ def simulate(
     written = _draw(voice, world, loaded, drive, target, colour)
     written |= _film(voice, world, loaded, drive, animate, pace)
     written |= _play(voice, world, loaded, drive, page)
+    written |= _record(voice, world, loaded, drive, record, course)
     voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": which, **written})
 
 
 def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:
-    """Refuse before the drive what could not be drawn after it."""
+    """Refuse before the drive what could not be drawn after it, and make room for the rest."""
     if target is not None:
         from gecar.plots.style import picture_kind
         from gecar.plots.trajectory import check_colour
 
         picture_kind(target)
         check_colour(colour)
+        target.parent.mkdir(parents=True, exist_ok=True)
     if animate is not None:
         from gecar.plots.animation import check_film
 
         check_film(animate, pace)
+        animate.parent.mkdir(parents=True, exist_ok=True)
 
 
 def _draw(
@@ -134,7 +142,6 @@ def _draw(
     from gecar.plots.trajectory import trajectory
     from gecar.report.drive import detail_of, title_of
 
-    target.parent.mkdir(parents=True, exist_ok=True)
     title, detail = title_of(drive, world.course), detail_of(world, drive)
     save(trajectory(world, program, drive, title=title, detail=detail, colour=colour), target)
     voice.say(f"Picture: {target}")
@@ -150,7 +157,6 @@ def _film(
     from gecar.plots.animation import film
     from gecar.report.drive import title_of
 
-    target.parent.mkdir(parents=True, exist_ok=True)
     film(world, program, drive, target, title=title_of(drive, world.course), pace=pace)
     voice.say(f"Film: {target}")
     return {"film": str(target)}
@@ -163,9 +169,23 @@ def _play(voice: Voice, world: World, program: Program, drive: Drive, target: Pa
     from gecar.plots.classroom import write_classroom_page
     from gecar.report.drive import detail_of, title_of
 
-    target.parent.mkdir(parents=True, exist_ok=True)
     write_classroom_page(
         world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
     )
     voice.say(f"Page: {target}")
     return {"page": str(target)}
+
+
+def _record(
+    voice: Voice, world: World, program: Program, drive: Drive, target: Path | None, course: str | None
+) -> dict[str, str]:
+    """Keep the drive as a recording if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.reality.recording import write_recording
+    from gecar.reality.rehearsal import rehearsal
+
+    place = str(Path(course).resolve()) if course and Path(course).is_file() else ""
+    write_recording(rehearsal(world, program, drive, target.stem, place), target)
+    voice.say(f"Recording: {target}")
+    return {"recording": str(target)}
