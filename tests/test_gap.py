@@ -119,6 +119,14 @@ def test_compare_writes_tables_and_a_picture(gecar, tmp_path):
         assert min(picture.size) > 800
 
 
+def test_a_rehearsed_drive_is_a_recording_without_a_gap(gecar, tmp_path):
+    (tmp_path / "best.txt").write_text(ARRIVES)
+    gecar("simulate", "best.txt", "--no-picture", "--record", "trials/one.csv")
+    ended = gecar("compare", "trials/one.csv", "--no-picture", "--frame", "course", "--json")
+    assert ended.json["trials"][0]["arrived"]
+    assert ended.json["trials"][0]["largest_displacement_m"] < 0.01
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [
