@@ -169,6 +169,7 @@ def _play(voice: Voice, world: World, program: Program, drive: Drive, target: Pa
     from gecar.plots.classroom import write_classroom_page
     from gecar.report.drive import detail_of, title_of
 
+    target.parent.mkdir(parents=True, exist_ok=True)
     write_classroom_page(
         world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
     )
@@ -185,6 +186,7 @@ def _record(
     from gecar.reality.recording import write_recording
     from gecar.reality.rehearsal import rehearsal
 
+    target.parent.mkdir(parents=True, exist_ok=True)
     place = str(Path(course).resolve()) if course and Path(course).is_file() else ""
     write_recording(rehearsal(world, program, drive, target.stem, place), target)
     voice.say(f"Recording: {target}")
