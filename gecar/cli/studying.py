@@ -82,11 +82,9 @@ class Asked:
             If there is no such executor or no worker.
         """
         workers = check_workers(usable_cores() if self.workers is None else self.workers)
-        if self.executor == "dask":
-            return Workplace.dask(self.scheduler, workers)
-        if self.executor not in ("process", "thread", "serial"):
+        if self.executor not in ("process", "thread", "serial", "dask"):
             raise expected("--executor", repr(self.executor), "process, thread, serial or dask")
-        return Workplace.here(self.executor, workers)
+        return Workplace.of(self.executor, workers, self.scheduler or "")
 
 
 def axis(words: str, where: str) -> Axis:
@@ -170,7 +168,7 @@ def _tell(
     voice.say(terminal_table(wanted, cells, paper))
     p = difference_p(cells)
     if p is not None:
-        voice.say(f"\nDo the cells differ at all? Kruskal-Wallis over the runs: p = {p:.2g}")
+        voice.say(f"\nDo the cells differ at all? Friedman over the seeds: p = {p:.2g}")
     evaluations = sum(record["evaluations"] for record in records)
     busy = sum(record["wall_s"] for record in records)
     voice.say(f"{evaluations:,} evaluations; {wall_s:.0f} s now, {busy:.0f} s of one worker in all")

@@ -67,7 +67,7 @@ def markdown(
     blocks = [f"# {_letters(study)}", about, _matrix(study, cells, paper), _full(study, cells, paper)]
     p = difference_p(cells)
     if p is not None:
-        blocks.append(f"Do the cells differ at all? Kruskal-Wallis: p = {p:.2g}.")
+        blocks.append(f"Do the cells differ at all? Friedman over the seeds: p = {p:.2g}.")
     return "\n\n".join(blocks) + "\n"
 
 

@@ -100,10 +100,15 @@ def cells_of(runs: Sequence[Planned], records: Sequence[Record | None]) -> list[
 def difference_p(cells: Sequence[Cell]) -> float | None:
     """Return the probability of differences this large between cells if the settings made none.
 
-    Kruskal and Wallis (1952), on ranks, so that a run without GOAL is simply the slowest. None for less than two cells
-    with two runs.
+    Friedman (1937), on ranks within each seed: runs of one seed begin with the same population, and a run without GOAL
+    is simply the slowest. None for less than three cells, two seeds that all of them have, or times that all agree.
     """
-    groups = [np.minimum(cell.times_s, UNSOLVED) for cell in cells if len(cell.records) > 1]
-    if len(groups) < 2 or len(set(np.concatenate(groups))) < 2:
+    seeds = (
+        set.intersection(*({record["seed"] for record in cell.records} for cell in cells)) if cells else set()
+    )
+    times = [
+        [min(record["fitness_s"], UNSOLVED) for record in c.records if record["seed"] in seeds] for c in cells
+    ]
+    if len(cells) < 3 or len(seeds) < 2 or np.all(np.ptp(times, axis=0) == 0.0):
         return None
-    return float(stats.kruskal(*groups).pvalue)
+    return float(stats.friedmanchisquare(*times).pvalue)

@@ -11,17 +11,16 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from typing import Any
 
-from gecar.errors import InputError, expected
+from gecar.errors import InputError
 from gecar.results.config import Config
 from gecar.results.provenance import versions
 from gecar.results.running import load_task, verified_on_pymunk
 from gecar.results.study import Planned, StudyFolder
 from gecar.search.batches import MAX_DEATHS, Batches
 from gecar.search.evolution import Evolution, run
-from gecar.search.executors import open_executor
+from gecar.search.executors import open_executor, side_by_side
 from gecar.search.history import Generation
 
 
@@ -83,38 +82,15 @@ class Workplace:
     workers: int
 
     @classmethod
-    def here(cls, kind: str, workers: int) -> Workplace:
-        """Return an executor of this machine; see `gecar.search.executors.open_executor`."""
-        return cls(partial(open_executor, kind, workers), 1 if kind == "serial" else workers)
-
-    @classmethod
-    def dask(cls, scheduler: str | None, workers: int) -> Workplace:
-        """Return Dask's executor.
-
-        Parameters
-        ----------
-        scheduler
-            Its address; None starts a cluster on this machine.
-        workers
-            Processes of that one.
+    def of(cls, kind: str, workers: int, scheduler: str = "") -> Workplace:
+        """Return an executor by kind; see `gecar.search.executors.open_executor`.
 
         Raises
         ------
         InputError
-            If Dask is not installed, or nobody answers at the address.
+            If there is no such kind, no worker, or Dask does not answer.
         """
-        try:
-            distributed = import_module("distributed")
-        except ImportError:
-            raise expected("--executor", "dask, which is not installed", "pip install distributed") from None
-        try:
-            here: dict[str, Any] = {"n_workers": workers, "threads_per_worker": 1}
-            client = distributed.Client(scheduler, timeout=10) if scheduler else distributed.Client(**here)
-        except (OSError, ValueError) as error:
-            raise expected(
-                "--scheduler", f"{scheduler}: {error}", "the address of a Dask scheduler"
-            ) from None
-        return cls(client.get_executor, max(1, sum(client.ncores().values())))
+        return cls(partial(open_executor, kind, workers, scheduler), side_by_side(kind, workers, scheduler))
 
 
 def perform_all(

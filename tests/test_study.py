@@ -1,0 +1,128 @@
+import json
+
+import numpy as np
+import pytest
+
+from gecar.errors import InputError
+from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
+from gecar.results.cells import cells_of, difference_p
+from gecar.results.performing import Workplace, perform, perform_all
+from gecar.results.study import Axis, Study, StudyFolder, read_study
+
+SMALL = {"workers": 1, "search": {"population": 10, "generations": 1, "codons": 50}}
+
+
+def study(**changes):
+    axes = Axis("elites", (0, 1)), Axis("mutation_rate", (0.1, 0.5))
+    return Study({}, SMALL, *axes, **{"seeds": (1, 2)} | changes)
+
+
+def record(run, time_s):
+    return {
+        "fitness_s": time_s, "solved": time_s < 1e4, "seed": run.config.seed, "evaluations": 20, "wall_s": 0.5,
+        "distinct_evaluations": 7, "simulated_steps": 900, "found_in_generation": 1, "program": "motor(1,1,1)",
+        "history": {"generation": [0, 1], "best": [1e4, time_s]}, "configuration": run.configuration,
+    }  # fmt: skip
+
+
+def test_a_plan_holds_every_combination_seed_after_seed():
+    plan = study().plan()
+    assert [(run.row, run.column, run.config.seed) for run in plan[:5]] == [
+        (0, 0.1, 1), (0, 0.5, 1), (1, 0.1, 1), (1, 0.5, 1), (0, 0.1, 2),
+    ]  # fmt: skip
+    assert plan[1].config.search.mutation_rate == 0.5
+    assert plan[1].config.search.population == 10
+    assert len({run.file for run in plan}) == len(plan)
+
+
+def test_anything_a_configuration_holds_may_vary():
+    mixed = Study({}, SMALL, Axis("course", ("paper", "hairpin")), Axis("preset", ("paper", "random")), (1,))
+    configs = [run.config for run in mixed.plan()]
+    assert [config.course for config in configs] == ["paper", "paper", "hairpin", "hairpin"]
+    assert [config.search.mutation for config in configs] == ["codon", "renew"] * 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"rows": Axis("colour", (1,))}, "colour"),
+        ({"rows": Axis("seed", (1,))}, "seed"),
+        ({"rows": Axis("elites", ())}, "elites"),
+        ({"rows": Axis("elites", (1, 1))}, "once"),
+        ({"rows": Axis("elites", (-1,))}, "elites"),
+        ({"rows": Axis("mutation_rate", (0.1,))}, "twice"),
+        ({"seeds": ()}, "seeds"),
+    ],
+)
+def test_a_grid_that_can_not_be_is_refused(changes, named):
+    rows = changes.pop("rows", Axis("elites", (0,)))
+    wrong = Study({}, SMALL, rows, Axis("mutation_rate", (0.1,)), **{"seeds": (1,)} | changes)
+    with pytest.raises(InputError, match=named):
+        wrong.plan()
+
+
+def test_finished_runs_are_kept_and_not_performed_again(tmp_path):
+    folder, runs = StudyFolder(tmp_path / "study"), study(seeds=(1,)).plan()
+    folder.begin(study(seeds=(1,)), again=False)
+    kept = []
+    perform_all(runs[:3], folder, Workplace.of("serial", 1), kept.append)
+    assert kept == runs[:3]
+    assert [folder.load(run) is None for run in runs] == [False, False, False, True]
+    assert read_study(tmp_path / "study") == study(seeds=(1,))
+
+
+def test_a_run_of_a_study_is_the_run_evolve_makes(gecar, tmp_path):
+    run = study().plan()[1]
+    words = ("--population", 10, "--generations", 1, "--codons", 50, "--elites", 0, "--mutation-rate", 0.5)
+    gecar("evolve", *words, "--seed", 1, "--workers", 1, "--out", "alone", "--no-pictures", "--quiet")
+    alone = json.loads((tmp_path / "alone/result.json").read_text())
+    ours = perform(run.config)
+    same = set(alone) - {"wall_s"}
+    assert {name: ours[name] for name in same} == {name: alone[name] for name in same}
+
+
+def test_workers_do_not_change_a_study(tmp_path):
+    runs, found = study(seeds=(1,)).plan(), []
+    for kind, workers in (("serial", 1), ("process", 2)):
+        folder = StudyFolder(tmp_path / kind)
+        folder.begin(study(), again=False)
+        perform_all(runs, folder, Workplace.of(kind, workers), lambda run: None)
+        found.append([{**folder.load(run), "wall_s": 0, "history": 0} for run in runs])
+    assert found[0] == found[1]
+
+
+def test_a_damaged_run_is_named(tmp_path):
+    folder, run = StudyFolder(tmp_path / "study"), study().plan()[0]
+    folder.begin(study(), again=False)
+    (folder.runs / run.file).write_text("{}")
+    with pytest.raises(InputError, match=run.file):
+        folder.load(run)
+
+
+def test_cells_count_a_run_without_goal_as_slowest():
+    runs = study(seeds=(1, 2, 3)).plan()
+    times = {1: 20.0, 2: 1e4, 3: 16.0}
+    cells = cells_of(runs, [record(run, times[run.config.seed]) for run in runs])
+    figures = cells[0].figures()
+    assert (figures["runs"], figures["solved"], figures["median_s"], figures["best_s"]) == (3, 2, 20.0, 16.0)
+    assert figures["mean_s"] == np.inf
+    assert figures["mean_solved_s"] == 18.0
+    assert difference_p(cells) is None  # all cells agree
+
+
+def test_a_setting_that_always_helps_is_told_from_chance():
+    runs = study(seeds=tuple(range(8))).plan()
+    better = [record(run, 20.0 + run.config.seed - 3.0 * run.row) for run in runs]
+    assert difference_p(cells_of(runs, better)) < 0.001
+
+
+def test_the_table_stands_beside_the_papers():
+    paper = Study({}, SMALL)
+    runs = paper.plan()
+    cells = cells_of(runs, [record(run, 15.0) for run in runs])
+    text = markdown(paper, cells, paper_figures(paper, runs), "about")
+    assert "| 0.5 | 15.00 (22.32) | 15.00 (16.74) | 15.00 (17.20) |" in text
+    assert "| 0.4 | 15.00 (-) | 15.00 (-) | 15.00 (22.51) |" in text
+    rows = csv_text(paper, cells, PAPER_TABLE_5).splitlines()
+    assert len(rows) == 10
+    assert rows[0].endswith("paper_s")
