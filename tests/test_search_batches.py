@@ -169,7 +169,7 @@ def test_no_workers_and_too_many_are_refused(workers: int) -> None:
 
 
 def test_an_unknown_executor_is_refused() -> None:
-    with pytest.raises(InputError, match="executor: found 'cloud', expected process, thread or serial"):
+    with pytest.raises(InputError, match="executor: found 'cloud', expected process, thread, serial or dask"):
         open_executor("cloud", 2)
 
 

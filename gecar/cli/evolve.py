@@ -79,6 +79,16 @@ def evolve(
         typer.Option("--workers", help="Processes; the result is the same for any number.", show_default="cores",
                      rich_help_panel=RUN),
     ] = None,
+    executor: Annotated[
+        str | None,
+        typer.Option("--executor", metavar="process|thread|serial|dask", help="Where programs are simulated.",
+                     show_default="process", rich_help_panel=RUN),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+                     show_default=False, rich_help_panel=RUN),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="A new folder for the results.",
@@ -103,7 +113,7 @@ def evolve(
     """
     from gecar.search.executors import prepare_workers
 
-    if workers != 1:
+    if workers != 1 and executor in (None, "process"):
         prepare_workers()  # they load beside this process
     voice = Voice(as_json)
     search = {
@@ -114,6 +124,7 @@ def evolve(
         "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
         "time_limit_s": time_limit, "engine": engine, "noise": noise, "motor_noise": motor_noise, "wraps": wraps,
         "robust": robust, "robust_by": robust_by,
+        "executor": executor or ("dask" if scheduler else None), "scheduler": scheduler,
     }  # fmt: skip
     changes = given(options) | {"search": given(search) | settings(setting or [])}
     from gecar.cli.running import begin, run_to_the_end

@@ -19,7 +19,7 @@ from gecar.search.settings import Settings, preset
 from gecar.world.rollout import STEP_S
 
 Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-NOT_PART_OF_THE_RESULT = {"preset", "executor", "workers"}
+NOT_PART_OF_THE_RESULT = {"preset", "executor", "workers", "scheduler"}
 """Fields that may differ when a run is resumed: the result does not depend on them, or other fields say it."""
 _ABOUT_THE_RUN = ("provenance", "fingerprints")
 
@@ -35,8 +35,8 @@ class Config(BaseModel):
         Names, or files.
     seed
         Where all randomness comes from.
-    executor, workers
-        Where programs are simulated.
+    executor, workers, scheduler
+        Where programs are simulated; the address is that of Dask's scheduler, empty for a cluster on this machine.
     time_limit_s, step_s, engine
         As in `gecar.world.rollout.World`.
     noise, motor_noise
@@ -57,8 +57,9 @@ class Config(BaseModel):
     grammar: str = "paper"
     robot: str = "ev3"
     seed: int = Field(1, ge=0, lt=2**63)
-    executor: Literal["process", "thread", "serial"] = "process"
+    executor: Literal["process", "thread", "serial", "dask"] = "process"
     workers: int = Field(default_factory=usable_cores, ge=1, le=MAX_WORKERS)
+    scheduler: str = ""
     time_limit_s: float = Field(60.0, gt=0.0, le=3_600.0)
     step_s: float = Field(STEP_S, ge=0.0001, le=0.01)
     engine: Literal["auto", "inline", "pymunk"] = "auto"

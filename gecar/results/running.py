@@ -21,7 +21,7 @@ from gecar.results.saving import Saver
 from gecar.search.batches import Batches
 from gecar.search.evaluation import DriveEvaluator
 from gecar.search.evolution import Evolution, noise_seed, rehearse, run
-from gecar.search.executors import open_executor
+from gecar.search.executors import open_executor, side_by_side
 from gecar.search.history import Generation
 from gecar.search.robust import RobustEvaluator
 from gecar.world.course import load_course
@@ -42,6 +42,11 @@ class Task:
     def configuration(self) -> str:
         """What identifies the run: `gecar.results.config.identify`."""
         return identify(self.config, self.fingerprints)
+
+    @property
+    def place(self) -> tuple[str, int, str]:
+        """Where programs are simulated, for `gecar.search.executors.open_executor`."""
+        return self.config.executor, self.config.workers, self.config.scheduler
 
     @property
     def evaluator(self) -> DriveEvaluator | RobustEvaluator:
@@ -93,6 +98,7 @@ def start(config: Config, out: Path) -> Started:
     """
     check_new(out)
     task = load_task(config)
+    side_by_side(*task.place)  # whoever has no cluster shall hear of it before there is a folder
     about = {"provenance": versions(), "fingerprints": task.fingerprints}
     return Started(task, RunFolder.create(out, as_toml(config, about)), task.evolution())
 
@@ -193,8 +199,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
 
 def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) -> None:
     config = task.config
-    open_again = partial(open_executor, config.executor, config.workers)
-    with Batches(task.evaluator, open_again, config.workers) as batches:
+    with Batches(task.evaluator, partial(open_executor, *task.place), side_by_side(*task.place)) as batches:
         rehearse(config.search, task.mapper)
         batches.warm()
         run(evolution, batches, after)

@@ -55,20 +55,23 @@ def check_workers(workers: int) -> int:
     return workers
 
 
-def open_executor(kind: str, workers: int) -> Executor:
-    """Return an executor on this machine.
+def open_executor(kind: str, workers: int, scheduler: str = "") -> Executor:
+    """Return an executor.
 
     Parameters
     ----------
     kind
-        ``process``: a pool of processes; ``thread``: of threads; ``serial``: no pool. One process is no pool.
+        ``process``: a pool of processes; ``thread``: of threads; ``serial``: no pool; ``dask``: Dask's. One process
+        is no pool.
     workers
-        How many.
+        How many, on this machine.
+    scheduler
+        Address of Dask's scheduler; empty for a cluster on this machine.
 
     Raises
     ------
     InputError
-        If there is no such kind, or no worker.
+        If there is no such kind, no worker, or Dask does not answer.
     """
     check_workers(workers)
     if kind == "serial" or (kind == "process" and workers == 1):
@@ -78,7 +81,33 @@ def open_executor(kind: str, workers: int) -> Executor:
         return ProcessPoolExecutor(workers, mp_context=_context(), initializer=start_worker)
     if kind == "thread":
         return ThreadPoolExecutor(workers)
-    raise expected("executor", repr(kind), "process, thread or serial")
+    if kind == "dask":
+        from gecar.search.cluster import DaskExecutor  # noqa: PLC0415  slow, and rarely wanted
+
+        return DaskExecutor(scheduler, workers)
+    raise expected("executor", repr(kind), "process, thread, serial or dask")
+
+
+def side_by_side(kind: str, workers: int, scheduler: str = "") -> int:
+    """Return how many calls an executor runs at a time; a cluster elsewhere is asked.
+
+    Raises
+    ------
+    InputError
+        As `open_executor`.
+    """
+    if kind == "serial":
+        return 1
+    if kind != "dask":
+        return check_workers(workers)
+    from gecar.search.cluster import DaskExecutor, check_installed  # noqa: PLC0415
+
+    if not scheduler:
+        check_installed()
+        return check_workers(workers)
+    executor = DaskExecutor(scheduler, workers)
+    executor.shutdown()
+    return executor.cores
 
 
 def prepare_workers() -> None:
@@ -90,12 +119,12 @@ def prepare_workers() -> None:
     if _context().get_start_method() == "forkserver":
         from multiprocessing import forkserver  # noqa: PLC0415  not there on every system
 
-        with _sigint_ignored():
+        with sigint_ignored():
             forkserver.ensure_running()
 
 
 @contextmanager
-def _sigint_ignored() -> Iterator[None]:
+def sigint_ignored() -> Iterator[None]:
     """Let processes started within ignore Ctrl-C, which is for this one to answer; only the main thread can."""
     if threading.current_thread() is not threading.main_thread():
         yield

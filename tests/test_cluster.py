@@ -1,0 +1,157 @@
+"""Dask: the same end as on this machine, whichever of its processes dies; skipped where it is not installed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from searching import MAPPER, SMALL, Toy, fingerprint, toy_scores
+
+from gecar.errors import InputError
+from gecar.results.folder import read_history, read_result
+from gecar.search import cluster as cluster_module
+from gecar.search.batches import Batches
+from gecar.search.cluster import run_as_here
+from gecar.search.evaluation import DriveEvaluator, Opcodes
+from gecar.search.evolution import Evolution, run
+from gecar.search.executors import open_executor, side_by_side
+from gecar.search.fitness import Scores
+from gecar.world.course import load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import World
+
+distributed = pytest.importorskip("distributed", reason="pip install 'gecar[cluster]'")
+WORLD = World(load_robot("ev3"), load_course("paper"), time_limit_s=4.0)
+TINY = ("--population", 20, "--generations", 2, "--time-limit", 4, "--no-pictures")
+
+
+@dataclass(frozen=True)
+class Mortal:
+    """A toy evaluator that kills its process at its first program."""
+
+    mark: Path
+
+    def __call__(self, programs: Sequence[Opcodes], _seeds: Sequence[int]) -> Scores:
+        if programs and not self.mark.exists():
+            self.mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return toy_scores(programs)
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """A scheduler with two workers, each of one thread."""
+    cluster_module.check_installed()
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+        yield cluster.scheduler_address
+
+
+def evolved(score: Batches | Toy) -> tuple[object, ...]:
+    evolution = Evolution(SMALL, MAPPER)
+    run(evolution, score)
+    return fingerprint(evolution)
+
+
+def test_a_cluster_evolves_what_this_process_does(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = evolved(Batches(DriveEvaluator(WORLD)))
+    assert side_by_side("dask", 7, address) == 2
+    for shared_from in (cluster_module.SHARED_FROM, 0):  # the recipe with each batch, or once to each worker
+        monkeypatch.setattr(cluster_module, "SHARED_FROM", shared_from)
+        with Batches(DriveEvaluator(WORLD), partial(open_executor, "dask", 2, address), 2) as batches:
+            assert evolved(batches) == alone
+
+
+def test_commands_end_the_same_on_a_cluster(gecar: Any, address: str) -> None:
+    for out, place in (("here", ("--workers", 1)), ("there", ("--scheduler", address))):
+        assert gecar("evolve", *TINY, *place, "--out", out).code == 0
+    here, there = (read_history(Path(name)) for name in ("here", "there"))
+    assert all(np.array_equal(here[k], there[k], equal_nan=True) for k in set(here) - {"wall_s"})
+    mine, other = (read_result(Path(name)) for name in ("here", "there"))
+    assert {**mine, "wall_s": 0} == {**other, "wall_s": 0}
+    assert gecar("evolve", "--resume", "--out", "there", "--executor", "serial", "--no-pictures").code == 0
+
+
+def test_a_killed_worker_of_a_cluster_loses_nothing(address: str, tmp_path: Path) -> None:
+    with Batches(Mortal(tmp_path / "mark"), partial(open_executor, "dask", 2, address), 2) as batches:
+        assert evolved(batches) == evolved(Toy())
+    assert (tmp_path / "mark").exists()
+
+
+def test_without_an_address_a_cluster_starts_here_and_ends(tmp_path: Path) -> None:
+    executor = open_executor("dask", 1)
+    process = executor.submit(os.getpid).result()
+    executor.shutdown()
+    assert process != os.getpid()
+    until = time.monotonic() + 10
+    while Path(f"/proc/{process}").exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not Path(f"/proc/{process}").exists()
+
+
+def test_a_missing_dask_is_one_line(gecar: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert "pip install 'gecar[cluster]'" in gecar.error("evolve", "--executor", "dask", "--out", "new")
+    assert not Path("new").exists()
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense://x", "not a place"])
+def test_a_wrong_address_is_one_line(address: str, gecar: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "ANSWER_WITHIN_S", 0.5)
+    words = gecar.error("evolve", "--scheduler", address, "--out", "new")
+    assert words.startswith(f"error: --scheduler: found {address}")
+    assert not Path("new").exists()
+
+
+def test_a_worker_with_another_gecar_is_refused() -> None:
+    assert run_as_here(cluster_module.CACHE.name, max, 3, 4) == 4
+    with pytest.raises(InputError, match="workers: found another gecar or Numba"):
+        run_as_here("kernels-of-old", max, 3, 4)
+
+
+def _start(*words: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", *words]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def test_a_scheduler_without_workers_or_that_goes_away_is_one_line(tmp_path: Path) -> None:
+    place = tmp_path / "scheduler.json"
+    words = ("--port", "0", "--no-dashboard", "--scheduler-file", str(place))
+    scheduler = _start("distributed.cli.dask_scheduler", *words)
+    worker = None
+    try:
+        while not place.exists():
+            assert scheduler.poll() is None
+            time.sleep(0.05)
+        import json
+
+        address = json.loads(place.read_text())["address"]
+        with pytest.raises(InputError, match=r"which has no worker, expected at least one; start them with"):
+            open_executor("dask", 1, address)
+        where = ("--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(tmp_path))
+        worker = _start("distributed.cli.dask_worker", address, *where, "--death-timeout", "2")
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=30)
+        executor = open_executor("dask", 1, address)
+        answer = executor.submit(time.sleep, 30)
+        time.sleep(0.3)
+        scheduler.kill()
+        gone = rf"--scheduler: found {address} no longer answers, expected a Dask scheduler that stays"
+        with pytest.raises(InputError, match=gone):
+            answer.result(timeout=20)
+        with pytest.raises(InputError, match=gone):
+            executor.submit(max, 1, 2)
+        executor.shutdown()
+    finally:
+        for process in filter(None, (scheduler, worker)):
+            process.kill()
+            process.wait()
