@@ -168,7 +168,7 @@ def _tell(
     voice.say(terminal_table(wanted, cells, paper))
     p = difference_p(cells)
     if p is not None:
-        voice.say(f"\nDo the cells differ at all? Kruskal-Wallis over the runs: p = {p:.2g}")
+        voice.say(f"\nDo the cells differ at all? Friedman over the seeds: p = {p:.2g}")
     evaluations = sum(record["evaluations"] for record in records)
     busy = sum(record["wall_s"] for record in records)
     voice.say(f"{evaluations:,} evaluations; {wall_s:.0f} s now, {busy:.0f} s of one worker in all")
