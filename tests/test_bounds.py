@@ -1,0 +1,59 @@
+"""What strangers' files may cost; docs/bounds.md has the table."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from gecar.errors import InputError
+from gecar.language.grammar import parse_grammar
+from gecar.language.mapping import Mapper, MappingOptions
+from gecar.language.program import parse_program
+from gecar.reality.recording import read_recording
+from gecar.world.course import COURSES, load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Outcome, World, simulate
+
+
+def test_an_endless_derivation_ends_at_the_most_symbols() -> None:
+    for text in ("<a> ::= <a><a> | motor(1,1,10)\n", "<a> ::= <a> | motor(1,1,10)\n"):
+        mapper = Mapper(parse_grammar(text), MappingOptions(wraps=1_000_000))
+        began = time.monotonic()
+        assert not mapper.map(np.zeros((50, 100), np.uint8)).valid.any()
+        assert time.monotonic() - began < 10.0
+
+
+def test_a_million_statements_are_refused_unread() -> None:
+    with pytest.raises(InputError, match="expected a program of at most 100000"):
+        parse_program("motor(1,1,10)\n" * 1_000_000)
+
+
+def test_a_loop_that_takes_no_time_is_stuck() -> None:
+    world = World(load_robot("ev3"), load_course("paper"))
+    assert simulate(world, parse_program("motor(5,5,0)\n" * 7_000).opcodes).outcome == Outcome.STUCK
+
+
+def test_a_recording_of_a_gigabyte_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "long.csv"
+    with path.open("wb") as stream:
+        stream.truncate(1_000_000_000)  # a hole: it takes no room on the disk
+    with pytest.raises(InputError, match="found 1000 MB, expected at most 67 MB"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("edge", [8_000, 20_000])
+def test_a_picture_that_unpacks_to_much_is_refused_unpacked(edge: int, tmp_path: Path) -> None:
+    Image.new("1", (edge, edge)).save(tmp_path / "bomb.png")
+    course = (
+        COURSES / "paper.toml"
+    ).read_text() + '\n[image]\nfile = "bomb.png"\npixels_per_metre = 1000.0\n'
+    (tmp_path / "course.toml").write_text(course)
+    with pytest.raises(InputError, match=r"image: found .*(pixels|bomb)"):
+        load_course(tmp_path / "course.toml")
+    (tmp_path / "course.toml").write_text("# " + "x" * 1_000_000)
+    with pytest.raises(InputError, match="expected a course file of at most 1000000"):
+        load_course(tmp_path / "course.toml")

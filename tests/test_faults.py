@@ -1,0 +1,115 @@
+"""What a run survives: a full disk, a folder nobody may write, Ctrl-C twice, and any damage to what it wrote."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from test_results import SHORT, outputs
+
+from gecar.errors import InputError
+from gecar.results.config import configure
+from gecar.results.running import finish, resume, start
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was never disturbed."""
+    folder = tmp_path_factory.mktemp("faults") / "whole"
+    finish(start(configure(SHORT), folder))
+    return folder
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 64 kB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)]
+    if not shutil.which("mount") or subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip("mounting a small disk needs root")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_disk_that_fills_up_stops_the_run_and_room_lets_it_go_on(small_disk: Path, whole: Path) -> None:
+    filler = small_disk / "filler"
+    started = start(configure(SHORT), small_disk / "run")
+
+    def fill(_: object) -> None:
+        with filler.open("ab") as stream:
+            stream.write(bytes(os.statvfs(small_disk).f_bavail * os.statvfs(small_disk).f_bsize))
+
+    with pytest.raises(InputError, match=r"found No space left on device, expected to write it; all before"):
+        finish(started, fill)
+    filler.unlink()
+    finish(resume(small_disk / "run"))
+    assert outputs(small_disk / "run") == outputs(whole)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_nobody_may_write_stops_the_run_and_leave_lets_it_go_on(tmp_path: Path, whole: Path) -> None:
+    out = tmp_path / "run"
+    started = start(configure(SHORT), out)
+    with pytest.raises(InputError, match=r"found Permission denied, expected to write it; all before"):
+        finish(started, lambda _: out.chmod(0o500))
+    out.chmod(0o700)
+    finish(resume(out))
+    assert outputs(out) == outputs(whole)
+
+
+def test_a_second_ctrl_c_does_not_cut_the_saving_short(tmp_path: Path, whole: Path) -> None:
+    out, before = tmp_path / "run", signal.getsignal(signal.SIGINT)
+    started = start(configure(SHORT), out)
+    save = started.folder.__class__.save
+
+    def interrupted(*args: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        save(*args)  # type: ignore[arg-type]
+
+    def stop(_: object) -> None:
+        patch.setattr(started.folder.__class__, "save", interrupted)
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        finish(started, stop)
+    signal.signal(signal.SIGINT, before)
+    finish(resume(out))
+    assert outputs(out) == outputs(whole)
+
+
+def _cut(raw: bytes, at: int) -> bytes:
+    return raw[:at]
+
+
+def _flip(raw: bytes, at: int) -> bytes:
+    return raw[:at] + bytes([raw[at] ^ 1 << at % 8]) + raw[at + 1 :]
+
+
+def _swap(raw: bytes, at: int) -> bytes:
+    return raw[:at] + raw[at : at + 2][::-1] + raw[at + 2 :]
+
+
+@pytest.mark.parametrize("damage", [_cut, _flip, _swap])
+@pytest.mark.parametrize("name", ["config.toml", "checkpoint", "history.csv", "best.txt", "result.json"])
+def test_damage_is_refused_in_one_line_or_changes_nothing(name, damage, whole, tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+    expected = outputs(whole)
+    chance = random.Random(f"{name} {damage.__name__}")
+    for k in range(2):
+        out = Path(shutil.copytree(whole, tmp_path / f"run{k}"))
+        raw = (out / name).read_bytes()
+        (out / name).write_bytes(damage(raw, chance.randrange(len(raw))))
+        try:
+            finish(resume(out))
+        except InputError as error:
+            assert "\n" not in str(error)  # noqa: PT017  other damage may do nothing at all
+            assert name in {"config.toml", "checkpoint"}
+        else:
+            found = outputs(out)
+            assert all(found[key] == expected[key] for key in ("history", "result", "best"))
