@@ -34,13 +34,13 @@ def discover(
       gecar discover recordings/monday --holdout run_07,run_08 --json
       gecar evolve --robot verdicts/monday/robot.toml
     """
-    import json  # noqa: PLC0415
+    import json
 
-    from gecar.files import write_whole  # noqa: PLC0415
-    from gecar.reality.discovery import discover as discover_case  # noqa: PLC0415
-    from gecar.reality.recording import read_case  # noqa: PLC0415
-    from gecar.report.verdict import sentences  # noqa: PLC0415
-    from gecar.world.robot import load_robot, write_robot  # noqa: PLC0415
+    from gecar.files import write_whole
+    from gecar.reality.discovery import discover as discover_case
+    from gecar.reality.recording import read_case
+    from gecar.report.verdict import sentences
+    from gecar.world.robot import load_robot, write_robot
 
     if workers < 0:
         raise expected("--workers", workers, "a number of 0 or more")
@@ -57,7 +57,7 @@ def discover(
     write_whole(out / "verdict.json", json.dumps(plain(verdict.as_json()), indent=1, allow_nan=False) + "\n")
     write_robot(verdict.robot, out / "robot.toml")
     if pictures:
-        from gecar.report.verdict_page import write_page  # noqa: PLC0415
+        from gecar.report.verdict_page import write_page
 
         write_page(verdict, out)
     for line in sentences(verdict):

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gecar.reality.selection import MOST_EFFECTS, ROUGH, Model, Selection, Step
+from gecar.reality.model import Model, Step
+from gecar.reality.screening import ROUGH
+from gecar.reality.selection import Selection
 
+MOST_EFFECTS = 4
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,8 @@ class Limits:
     unexplained: float
 
 
-# Measured on robots in a 3D engine with nothing concealed: motion 0.2 to 2.5; sight up to 18, for a path's errors linger
-# while the sensor crosses an edge.
+# Measured on robots in a 3D engine with nothing concealed: motion 0.2 to 0.6; sight up to 8, for a path's errors
+# linger while the sensor crosses an edge.
 MOTION = Limits(floor=0.7, least_drop=0.1, unexplained=2.5)
 SIGHT = Limits(floor=6.0, least_drop=1.5, unexplained=25.0)
 MAIN_SHARE = 0.35  # of what is left: what an effect explains that is no stand-in
@@ -60,27 +63,30 @@ class Explanation:
 
 def explain(selection: Selection) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate."""
-    model = selection.bare
+    model = selection.nothing
     steps: list[Step] = []
     tried: list[tuple[Step, ...]] = []
-    while len(steps) < MOST_EFFECTS and model.structure > _limits(selection).least_drop * selection.blocks:
+    while (
+        len(steps) < MOST_EFFECTS and model.structure > _limits(selection).least_drop * selection.blocks.count
+    ):
         done = selection.steps(model)
         if selection.align(model, done[0].gain if done else 0.0):
             selection.tell("the camera's clock differs from recording to recording: taken out")
             return explain(selection)
         tried.append(tuple(done))
-        step = _best(selection, model, done)
+        step = _best(selection, done)
         if step is None:
             break
-        selection.tell(
-            f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left"
-        )
+        selection.tell(f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left")
         steps.append(step)
         model = step.model
     kept = steps[: _kept(selection, steps)]
     taken = _settled(selection, kept, tried)
     left = selection.rid_of_subtle(taken).structure
-    floor = max(_limits(selection).unexplained * selection.blocks, UNEXPLAINED_SHARE * selection.bare.structure)
+    floor = max(
+        _limits(selection).unexplained * selection.blocks.count,
+        UNEXPLAINED_SHARE * selection.nothing.structure,
+    )
     return Explanation(taken, tuple(kept), tuple(tried), left > floor)
 
 
@@ -91,7 +97,7 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
     against its runners-up, and dropped where the others can do without it.
     """
     if not kept:
-        return selection.bare
+        return selection.nothing
     best = kept[-1].model
     for number, step in enumerate(list(kept[:-1])):
         for other in tried[number][1:4]:
@@ -114,11 +120,15 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
     return selection.polished(found) if ROUGH.intersection(found.effects) else found
 
 
-def _best(selection: Selection, model: Model, done: list[Step]) -> Step | None:
+def _best(selection: Selection, done: list[Step]) -> Step | None:
     """Return the best step worth a name that holds on left-out recordings; None if there is none."""
     for step in done[:4]:
         drop = step.before - step.after
-        if not step.worthwhile or drop < _limits(selection).least_drop * selection.blocks or step.gain < 0.3 * done[0].gain:
+        if (
+            not step.worthwhile
+            or drop < _limits(selection).least_drop * selection.blocks.count
+            or step.gain < 0.3 * done[0].gain
+        ):
             continue
         judged = selection.judged(step)
         if judged.left_out.sum() > judged.null_95 and judged.p < 0.05:
@@ -136,7 +146,7 @@ def _kept(selection: Selection, steps: list[Step]) -> int:
         return 0
     limits = _limits(selection)
     first = steps[0].before
-    excess = max(first - limits.floor * selection.blocks, limits.least_drop * selection.blocks)
+    excess = max(first - limits.floor * selection.blocks.count, limits.least_drop * selection.blocks.count)
     kept, whole_before = 0, False
     for number, step in enumerate(steps, start=1):
         whole = first - step.after >= WHOLE_SHARE * excess

@@ -132,7 +132,7 @@ class Comparison:
         self.replays = 0
 
     def set_path(self, physics: npt.NDArray[Any], colour: Array | None = None) -> None:
-        """Base sight on the path as a model sees it."""
+        """Set the path sight is based on: as a model sees it, with noise of a colour."""
         for strip in self.strips:
             strip.path_colour = np.ones(3) if colour is None else np.sqrt(colour)
         list(self._pool.map(lambda strip: strip.set_path(physics), self.strips))

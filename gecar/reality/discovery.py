@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.alignment import fitted_offsets
 from gecar.reality.chain import Explanation, explain
 from gecar.reality.comparison import Comparison, Strip
 from gecar.reality.confusion import alternatives
 from gecar.reality.fitting import cost
-from gecar.reality.freedom import free
+from gecar.reality.formula import describe
 from gecar.reality.holdout import Split, judge, split
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
@@ -75,12 +76,12 @@ class Evidence:
 
 
 def _told(name: str, selection: Selection, explained: Explanation) -> str:
-    blocks = max(selection.blocks, 1)
+    blocks = max(selection.blocks.count, 1)
     tried = [
         f"{s.effect}{'' if s.worthwhile else '-'} {s.gain:.0f}/{s.model.structure / blocks:.2f}"
         for s in (explained.tried[-1][:3] if explained.tried else ())
     ]
-    before, after = selection.bare.structure / blocks, explained.taken.structure / blocks
+    before, after = selection.nothing.structure / blocks, explained.taken.structure / blocks
     return f"{name} {before:.2f} -> {after:.2f} last tried: {', '.join(tried)}"
 
 
@@ -134,14 +135,17 @@ def discover(
         Comparison(shop.strips, False, shop.pool), shop.robot, _seen(shop), shop.split.fitted, seed, tell
     )
     moved = explain(motion)
-    colour = motion.colour(motion.rid_of_subtle(moved.taken).fit.errors)[list(POSES)]
+    colour = motion.blocks.colour(motion.rid_of_subtle(moved.taken).fit.errors)[list(POSES)]
     sight, seen = _look(shop, moved, colour)
     found_robot = shop.robot.with_effects({**moved.taken.values, **(seen.taken.values if seen else {})})
     tell("intervals, alternatives, whereabouts")
+    if motion.clocked:
+        _set_clocks(shop, found_robot)
     judgement = _judge(shop, found_robot, colour)
-    found = _found(shop, motion, moved, found_robot) + (
-        _found(shop, sight, seen, found_robot) if sight and seen else ()
-    )
+    found, rivals = _found(shop, motion, moved, found_robot)
+    if sight and seen:
+        more, others = _found(shop, sight, seen, found_robot)
+        found, rivals = found + more, rivals + others
     located = _locate(shop, motion, sight)
     unexplained = moved.unexplained or bool(seen and seen.unexplained)
     verdict = (
@@ -150,14 +154,19 @@ def discover(
         else ("missing" if found else "nothing")
     )
     white, p = whiteness(motion, moved.taken)
+    formula = (
+        describe(shop.strips, shop.held, moved.taken.freedom.physics(moved.taken.fit.z))
+        if moved.unexplained
+        else None
+    )
     return Verdict(
         case=case.name,
         verdict=verdict,
         effects=found,
         located=located,
         judgement=judgement,
-        residual=Residual(white and not unexplained, p, None),
-        next_recording=suggest(shop.robot, moved.taken, motion, found, shop.noise, unexplained),
+        residual=Residual(white and not unexplained, p, str(formula) if formula is not None else None),
+        next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
         notes=_notes(shop, motion),
@@ -217,7 +226,9 @@ def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection
     if not comparison.strips:
         return None, None
     comparison.set_path(moved.taken.freedom.physics(moved.taken.fit.z), colour)
-    known = shop.robot.with_effects(moved.taken.values)  # a late camera, a skewed clock shift what is seen, too
+    known = shop.robot.with_effects(
+        moved.taken.values
+    )  # a late camera, a skewed clock shift what is seen, too
     selection = Selection(comparison, known, SIGHT, shop.split.fitted, shop.seed, shop.tell)
     return selection, explain(selection)
 
@@ -229,37 +240,38 @@ def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
     return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
 
 
-def _found(shop: _Workshop, selection: Selection, explained: Explanation, robot: Robot) -> tuple[Found, ...]:
+def _set_clocks(shop: _Workshop, found: Robot) -> None:
+    """Take the camera clocks out of the recordings set aside, too: a nuisance, as a start pose is."""
+    held = Comparison(shop.held, False, shop.pool)
+    held.set_offsets(fitted_offsets(held, lambda: held.errors(found.physics))[0])
+
+
+def _found(
+    shop: _Workshop, selection: Selection, explained: Explanation, robot: Robot
+) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
+    """Return what was found, and robots with an alternative in its place."""
     taken = explained.taken
     if not taken.effects:
-        return ()
+        return (), ()
     spans = intervals(selection, taken)
     held = Comparison(shop.held, selection.comparison.sight, shop.pool)
     with_all = cost(held.errors(robot.physics)) if held.strips else 0.0
-    out = []
+    out, rivals = [], []
     for step in explained.steps:
-        rest = robot.model_copy(
-            update={"effects": {k: v for k, v in robot.effects.items() if k != step.effect}}
-        )
-        gain = cost(held.errors(rest.physics)) - with_all if held.strips else float("nan")
-        out.append(
-            Found(
-                step.effect,
-                alternatives(selection, explained, step),
-                spans[step.effect],
-                gain,
-                step.null_95,
-                step.p,
-            )
-        )
-    return tuple(out)
+        rest = {k: v for k, v in robot.effects.items() if k != step.effect}
+        without = robot.model_copy(update={"effects": rest})
+        gain = cost(held.errors(without.physics)) - with_all if held.strips else float("nan")
+        others = alternatives(selection, explained, step)
+        rivals += [without.with_effects(model.values) for model in others.values()]
+        out.append(Found(step.effect, tuple(others), spans[step.effect], gain, step.null_95, step.p))
+    return tuple(out), tuple(rivals)
 
 
 def _locate(shop: _Workshop, motion: Selection, sight: Selection | None) -> tuple[Place, ...]:
-    parts = [(motion.bare.fit.errors, motion.cells)]
+    parts = [(motion.nothing.fit.errors, motion.cells)]
     if sight is not None:
         where = np.array([shop.strips.index(s) for s in sight.comparison.strips], np.int32)
-        parts.append((sight.bare.fit.errors, replace(sight.cells, recording=where[sight.cells.recording])))
+        parts.append((sight.nothing.fit.errors, replace(sight.cells, recording=where[sight.cells.recording])))
     return Map(shop.strips, parts, shop.robot.physics).places(np.random.default_rng(shop.seed))
 
 
@@ -276,8 +288,3 @@ def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:
     if not {"x_m", "heading_rad"} & measured:
         notes.append("No pose was recorded: what only a camera sees was not looked for.")
     return tuple(notes)
-
-
-def nominal_freedom(robot: Robot) -> Array:
-    """Return the empty vector of a robot with nothing freed, shape (0,)."""
-    return np.zeros(free(robot, ()).size)

@@ -91,7 +91,6 @@ def _see_rows(
     reel: Reel,
     s: Any,
     p: Any,
-    c: Any,
     rows: Array,
     errors: Array,
     last: Array,
@@ -133,7 +132,8 @@ def _see_rows(
 def _wander(before: Array, x: float, y: float, elapsed: float, walk: Array, spread: Array) -> None:
     """Let the pose's uncertainty grow over a stretch driven since the last pose.
 
-    d(x, y) follows the heading's error turned a quarter: F = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]]; P becomes F P F' + Q.
+    d(x, y) follows the heading's error turned a quarter: F = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]];
+    P becomes F P F' + Q.
     """
     dx = x - before[0]
     dy = y - before[1]
@@ -258,7 +258,7 @@ def follow(
     shift = np.zeros(3)
     for k in range(3):
         spread[k, k] = 0.01  # the start pose is known to 0.1 m and 6 degrees: to nothing, beside what follows
-    i = _see_rows(0, 0.0, stretch, reel, s, p, c, rows, row_errors, last)
+    i = _see_rows(0, 0.0, stretch, reel, s, p, rows, row_errors, last)
     j = _see_poses(0, 0.0, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)
     at = -1
     n = 0
@@ -277,5 +277,5 @@ def follow(
             step(s, left, right, p, c)
             drift(s, c)
         n += 1
-        i = _see_rows(i, n * dt, stretch, reel, s, p, c, rows, row_errors, last)
+        i = _see_rows(i, n * dt, stretch, reel, s, p, rows, row_errors, last)
         j = _see_poses(j, n * dt, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)

@@ -123,7 +123,9 @@ def judge(
             deviation = _rms(np.concatenate(spread[field]))
             pair = np.concatenate(errors[field], axis=1)
             sizes = [_rms(pair[k]) / max(deviation, 1e-12) for k in range(2)]
-            out[column] = Misfit(sizes[0], sizes[1], float(floors[field]) / max(deviation, 1e-12))
+            # What a robot reaches, noise allows: the floor's estimate is cautious.
+            floor = min(float(floors[field]) / max(deviation, 1e-12), *sizes)
+            out[column] = Misfit(sizes[0], sizes[1], floor)
     return out
 
 

@@ -107,7 +107,8 @@ class Map:
         kept[order[: 1 + int(np.searchsorted(gathered, 0.6 * gathered[-1]))]] = True
         edges = np.flatnonzero(np.diff(np.r_[0, kept.astype(int), 0]))
         spans = [
-            (round(float(a) * BIN_S, 2), round(float(b) * BIN_S, 2)) for a, b in zip(edges[::2], edges[1::2], strict=True)
+            (round(float(a) * BIN_S, 2), round(float(b) * BIN_S, 2))
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
         ]
         return loud, tuple(spans)
 

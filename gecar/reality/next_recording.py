@@ -1,4 +1,8 @@
-"""The recording to make next: from a library of command sequences a robot can drive, the one that tells most."""
+"""The recording to make next: from a library of command sequences a robot can drive, the one that tells most.
+
+Each is driven by the robot as found and by its rival, the robot with the confused effect exchanged or with a parameter
+at the end of its interval; the sequence where camera and encoders see them part furthest, in standard deviations, wins.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +11,18 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.comparison import Comparison
-from gecar.reality.fitting import cost
-from gecar.reality.freedom import Freedom
 from gecar.reality.noise import Noise
-from gecar.reality.selection import Model, Selection
+from gecar.reality.recording import Recording, make_recording
+from gecar.reality.replay import Film
+from gecar.reality.setup import Setup
 from gecar.reality.verdict import Found, NextRecording
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Commands = tuple[tuple[float, float, float], ...]
+
+ROW_S = 0.01
+START = (1.2, 0.6, 0.0)  # m, m, rad: the middle of the paper's course
 
 
 def _holds(length_s: float, *duties: tuple[float, float]) -> Commands:
@@ -42,48 +48,76 @@ LIBRARY: dict[str, Commands] = {
 
 
 def suggest(
-    robot: Robot, taken: Model, motion: Selection, found: Sequence[Found], noise: Noise, unexplained: bool
+    robot: Robot,
+    found: Sequence[Found],
+    rivals: Sequence[Robot],
+    like: Recording,
+    noise: Noise,
+    unexplained: bool,
 ) -> NextRecording:
-    """Return what to record next, and why."""
-    confused = next(((f.id, f.alternatives) for f in found if f.alternatives), None)
-    if confused is not None:
-        why = f"tells {confused[0]} from {' and '.join(confused[1])}"
-        name = (
-            "full steps"
-            if "rotor_inertia" in confused[1] or "actuation_delay" in confused[1]
-            else _for(confused[0])
+    """Return what to record next, and why.
+
+    Parameters
+    ----------
+    robot
+        As found.
+    found
+        Its effects.
+    rivals
+        Robots that do as well on these recordings, one for each effect that has alternatives.
+    like
+        A recording whose rig and columns the next one will have.
+    noise
+        Of the sensors.
+    unexplained
+        Whether something is left that nothing explains.
+    """
+    if rivals:
+        confused = next(f for f in found if f.alternatives)
+        name = _telling(robot, rivals[0], like, noise)
+        return NextRecording(
+            f"{name}: tells {confused.id} from {' and '.join(confused.alternatives)}", LIBRARY[name]
         )
-        return NextRecording(f"{name}: {why}", LIBRARY[name])
     if unexplained:
         name = "long and slow, then long and fast"
         return NextRecording(
             f"{name}: shows whether what is left depends on speed, way or time", LIBRARY[name]
         )
     if found:
-        name = _for(found[0].id)
+        name = _telling(robot, _moved(robot, found[0]), like, noise)
         return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
-    return NextRecording(
-        "reversals: nothing is missing so far; this asks most of gears, friction and grip",
-        LIBRARY["reversals"],
+    words = "reversals: nothing is missing so far; this asks most of gears, friction and grip"
+    return NextRecording(words, LIBRARY["reversals"])
+
+
+def _moved(robot: Robot, found: Found) -> Robot:
+    """Return a robot with an effect's first parameter at the end of its interval."""
+    label, interval = next(iter(found.parameters.items()))
+    values = {name: i.value for name, i in found.parameters.items()}
+    return robot.with_effects({found.id: {**values, label: interval.high}})
+
+
+def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> str:
+    return max(LIBRARY, key=lambda name: _difference(LIBRARY[name], robot, rival, like, noise))
+
+
+def _difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
+    """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations."""
+    blank = _recording(commands, {}, like)
+    rows = Film(blank, noise.sd).play(robot.physics, np.array(START))[0]
+    angles = {"left_angle_deg": np.degrees(rows[:, 0]), "right_angle_deg": np.degrees(rows[:, 1])}
+    poses = {"x_m": rows[:, 4], "y_m": rows[:, 5], "heading_deg": np.degrees(rows[:, 6])}
+    seen = {**angles, **(poses if like.setup.rig == "floor" else {})}
+    film = Film(_recording(commands, seen, like), noise.sd, noise.walk, memory_s=1.0)
+    _, row_errors, _, pose_errors = film.play(rival.physics)
+    return float(np.nansum(row_errors[:, :2] ** 2) + np.nansum(pose_errors**2))
+
+
+def _recording(commands: Commands, seen: dict[str, Array], like: Recording) -> Recording:
+    table = np.array(commands)
+    t = np.arange(0.0, table[-1, 0] + 0.5, ROW_S)
+    at = np.searchsorted(table[:, 0], t, side="right") - 1
+    duties = {"left_duty_pct": table[at, 1], "right_duty_pct": table[at, 2]}
+    return make_recording(
+        "next", {"t_s": t, **duties, **seen}, Setup(rig=like.setup.rig, duty_cap=like.setup.duty_cap)
     )
-
-
-_FOR = {
-    "backlash": "reversals", "static_friction": "starts from rest at small duties",
-    "dead_band": "starts from rest at small duties", "track_width": "spins at rising speeds",
-    "wheel_radius": "straight at rising speeds", "caster_drag": "spins at rising speeds",
-    "com_offset": "arcs to both sides", "rotor_inertia": "full steps", "actuation_delay": "full steps",
-    "command_slew": "full steps", "battery_drain": "long and slow, then long and fast",
-}  # fmt: skip
-
-
-def _for(effect: str) -> str:
-    return _FOR.get(
-        effect,
-        "the line, crossed to and fro"
-        if effect.startswith(("sensor", "spot", "line"))
-        else "straight at rising speeds",
-    )
-
-
-_ = (Comparison, cost, Freedom)

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting import cost, weights
-from gecar.reality.selection import Model, Selection
+from gecar.reality.model import Model
+from gecar.reality.selection import Selection
 from gecar.reality.verdict import Interval
 
 Array = npt.NDArray[np.float64]
@@ -23,18 +24,18 @@ NOTICED = 12.0  # of cost: what walking along a flat parameter must not raise it
 def deviations(selection: Selection, model: Model) -> Array:
     """Return standard deviations of a model's coordinates, shape (k,).
 
-    The larger of two: a sandwich over half-second spans, which holds whatever the noise's colour, and the jackknife over
-    recordings, which also feels what no noise model knows.
+    The larger of two: a sandwich over half-second spans, which holds whatever the noise's colour, and the jackknife
+    over recordings, which also feels what no noise model knows.
     """
     slopes, errors = selection.slopes(model), model.fit.errors
     w = weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
-    scores = np.stack([np.bincount(selection.spans, s * w * errors) for s in slopes.T], axis=1)
+    scores = np.stack([np.bincount(selection.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
     sandwich = inverse @ (scores.T @ scores) @ inverse
     leaps = []
-    for k in np.unique(selection.folds):
-        rows = selection.folds == k
+    for k in np.unique(selection.blocks.folds):
+        rows = selection.blocks.folds == k
         part = slopes[rows].T @ (w[rows, None] * slopes[rows])
         leaps.append(
             np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
@@ -53,9 +54,14 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
     low, high = model.freedom.bounds
     for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
         z = float(model.fit.z[k])
-        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + (SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0)
+        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + (
+            SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0
+        )
         if sd > FLAT:
-            down, up = (_walked(selection, model, k, side, abs(end - z)) for side, end in ((-1.0, low[k]), (1.0, high[k])))
+            down, up = (
+                _walked(selection, model, k, side, abs(end - z))
+                for side, end in ((-1.0, low[k]), (1.0, high[k]))
+            )
         else:
             down = up = NORMAL_95 * sd
         reach = NORMAL_95 * 0.5 * size

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gecar.reality.selection import Model, Selection
+from gecar.reality.model import Model
+from gecar.reality.selection import Selection
+from gecar.reality.subtle import subtle_slopes
 
 DRAWS = 200
 SUBTLE = 0.5  # of the smallest sizes worth a name: the nulls' robots are off by up to so much in everything
@@ -16,13 +18,13 @@ def whiteness(selection: Selection, model: Model) -> tuple[bool, float]:
     The nulls are recordings of robots that differ from the model in every constant by less than is worth a name, with
     white noise: structure that such robots have is the price of any model.
     """
-    if not selection.blocks:
+    if not selection.blocks.count:
         return True, 1.0
-    rng = np.random.default_rng(selection.blocks)
-    slopes = np.concatenate(selection.subtle_slopes(model), axis=1)
+    rng = np.random.default_rng(selection.blocks.count)
+    slopes = np.concatenate(subtle_slopes(selection, selection.catalogue, model), axis=1)
     drawn = []
     for _ in range(DRAWS):
         errors = rng.standard_normal(len(slopes)) + slopes @ rng.uniform(-SUBTLE, SUBTLE, slopes.shape[1])
-        drawn.append(selection.structure(errors))
+        drawn.append(selection.blocks.structure(errors))
     p = float((1 + np.sum(np.array(drawn) >= model.structure)) / (1 + DRAWS))
     return p > 0.05, p

@@ -21,7 +21,9 @@ def sentences(verdict: Verdict) -> list[str]:
     if verdict.verdict.endswith("unexplained"):
         out.append(_unexplained(verdict))
     if verdict.located:
-        out.append("Where simulation and reality part: " + "; ".join(_place(p) for p in verdict.located[:3]) + ".")
+        out.append(
+            "Where simulation and reality part: " + "; ".join(_place(p) for p in verdict.located[:3]) + "."
+        )
     out += list(verdict.notes)
     out.append(f"Next recording: {verdict.next_recording.why}.")
     return out
@@ -40,7 +42,9 @@ def _headline(verdict: Verdict) -> str:
 def _effect(found: Found) -> str:
     effect = BY_ID[found.id]
     sizes = ", ".join(f"{label} {_interval(i)}" for label, i in found.parameters.items())
-    words = f"{effect.title[0].upper()}{effect.title[1:]} ({effect.id}): {sizes}. It shows in {effect.signature}."
+    words = (
+        f"{effect.title[0].upper()}{effect.title[1:]} ({effect.id}): {sizes}. It shows in {effect.signature}."
+    )
     if found.alternatives:
         words += f" These recordings can not tell it from {' or '.join(found.alternatives)}."
     return words
@@ -59,7 +63,11 @@ def _proof(verdict: Verdict) -> str:
         if m.before > 1.5 * m.floor and m.before > 1.2 * m.after
     }
     parts = ", ".join(f"{share:.0%} in {name}" for name, share in closed.items())
-    where = "the part set aside" if judged.by_time else f"recordings not used for the fit ({', '.join(judged.recordings)})"
+    where = (
+        "the part set aside"
+        if judged.by_time
+        else f"recordings not used for the fit ({', '.join(judged.recordings)})"
+    )
     return f"On {where} this explains of the mismatch: {parts}." if parts else f"Judged on {where}."
 
 

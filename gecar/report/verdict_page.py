@@ -13,4 +13,7 @@ from gecar.report.verdict import sentences
 def write_page(verdict: Verdict, folder: Path) -> None:
     """Write ``report.html``."""
     body = "".join(f"<p>{html.escape(line)}</p>" for line in sentences(verdict))
-    write_whole(folder / "report.html", f"<!doctype html><meta charset='utf-8'><title>{html.escape(verdict.case)}</title>{body}")
+    write_whole(
+        folder / "report.html",
+        f"<!doctype html><meta charset='utf-8'><title>{html.escape(verdict.case)}</title>{body}",
+    )

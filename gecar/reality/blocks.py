@@ -1,0 +1,94 @@
+"""Blocks of residuals: what survives averaging over them is structure, not noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.comparison import CHANNELS, Cells
+
+Array = npt.NDArray[np.float64]
+
+BLOCK_S = 0.15  # structure is what survives averaging over this
+SPAN_S = 0.5  # spans whose signs the null draws
+STEADY = (0, 1, 7)  # channels whose noise is white: encoders, reflection
+CHI_SQUARE_MEDIAN = 0.455
+MOST_COLOUR = 6.0  # noise that lingers for longer than a block, wholly
+CLIP = 30.0
+
+
+class Blocks:
+    """How residuals gather in recordings, spans and blocks.
+
+    Attributes
+    ----------
+    folds
+        What is left out together, shape (n,).
+    spans
+        Half-second spans, shape (n,).
+    count
+        Number of blocks.
+    """
+
+    def __init__(self, cells: Cells) -> None:
+        self.folds = _folds(cells)
+        self.spans = _group(cells, SPAN_S)
+        self._of = _group(cells, BLOCK_S)
+        self.count = int(self._of.max()) + 1 if len(self._of) else 0
+        self._samples = np.bincount(self._of)
+        self._channel = np.zeros(self.count, np.int64)
+        self._channel[self._of] = cells.channel
+
+    def structure(self, errors: Array, colour: Array | None = None) -> float:
+        """Return the energy short averages keep, above what noise of a colour would leave.
+
+        Parameters
+        ----------
+        errors
+            Whitened residuals.
+        colour
+            As `colour` returns it; default: that of these residuals.
+        """
+        if not len(errors):
+            return 0.0
+        energy = self._energy(errors)
+        expected = (self.colour(errors) if colour is None else colour)[self._channel]
+        return float(np.sum(energy / expected - 1.0))
+
+    def colour(self, errors: Array) -> Array:
+        """Return by how much slow noise exceeds white noise in each channel, shape (channels,); 1 for white.
+
+        Sensors' noise lingers everywhere, also where the robot does nothing; what physics is missing shows here and
+        there. So the typical block tells the noise. Encoders round, they do not linger; the colour sensor mostly sees
+        an even floor, whose noise is clipped.
+        """
+        energy = self._energy(errors)
+        out = np.ones(len(CHANNELS))
+        for channel in np.unique(self._channel):
+            if channel not in STEADY:
+                typical = np.median(energy[self._channel == channel]) / CHI_SQUARE_MEDIAN
+                out[channel] = np.clip(typical, 1.0, MOST_COLOUR)
+        return out
+
+    def _energy(self, errors: Array) -> Array:
+        return np.bincount(self._of, np.clip(errors, -CLIP, CLIP)) ** 2 / self._samples
+
+
+def _folds(cells: Cells) -> npt.NDArray[np.int32]:
+    """Return what is left out together: recordings, or thirds of the time where there are too few."""
+    if len(cells.recording) and cells.recording.max() >= 2:
+        return cells.recording
+    if not len(cells.t_s):
+        return np.zeros(0, np.int32)
+    third = np.minimum((3.0 * cells.t_s / max(cells.t_s.max(), 1e-9)).astype(np.int32), 2)
+    return (3 * cells.recording + third).astype(np.int32)
+
+
+def _group(cells: Cells, length_s: float) -> npt.NDArray[np.int64]:
+    """Return each residual's block of a length, by recording and channel."""
+    if not len(cells.t_s):
+        return np.zeros(0, np.int64)
+    key = (cells.recording.astype(np.int64) * 16 + cells.channel) * 10_000_000 + (
+        cells.t_s / length_s
+    ).astype(np.int64)
+    return np.unique(key, return_inverse=True)[1]

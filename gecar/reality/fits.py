@@ -1,0 +1,118 @@
+"""Fits of effects to a comparison, and how its residuals feel their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.blocks import Blocks
+from gecar.reality.comparison import Comparison
+from gecar.reality.fitting import Fit, cost, fit, jacobian, weights
+from gecar.reality.freedom import Freedom, free
+from gecar.reality.model import Effects, Model
+from gecar.reality.rough_search import rough_search
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+NO_SHIFT = np.zeros(1)
+# How far about a fit is worth a search, in coordinates, where it is not 1.
+ROUGH_SPREAD = {
+    "patch_radius": 1.5,
+    "patch_x": 2.0,
+    "patch_y": 2.0,
+    "patch_friction": 0.5,
+    "stribeck_speed": 0.7,
+}
+
+
+class Fits:
+    """A comparison and a robot whose effects are fitted to it.
+
+    Parameters
+    ----------
+    comparison
+        What is fitted.
+    robot
+        As far as it is known.
+    seed
+        Of every draw of chance.
+    """
+
+    def __init__(self, comparison: Comparison, robot: Robot, seed: int = 0) -> None:
+        self.comparison, self.robot = comparison, robot
+        self.rng = np.random.default_rng(seed)
+        comparison.errors(robot.physics)
+        self.cells = comparison.cells
+        self.blocks = Blocks(self.cells)
+        self._kept_slopes: tuple[Model | None, Array] = (None, np.zeros((0, 0)))
+
+    def bare(self) -> Model:
+        """Return the robot with nothing fitted."""
+        errors = self.comparison.errors(self.robot.physics)
+        found = Fit(np.zeros(0), errors, np.zeros((len(errors), 0)), cost(errors))
+        return Model((), free(self.robot, ()), found, self.blocks.structure(errors))
+
+    def residual(self, freedom: Freedom, shift: Array = NO_SHIFT) -> Callable[[Array], Array]:
+        """Return the function that fits minimise."""
+        return lambda z: self.comparison.errors(freedom.physics(z)) - shift
+
+    def refit(
+        self, effects: Sequence[str], values: Effects, rounds: int = 10, shift: Array = NO_SHIFT
+    ) -> Model:
+        """Fit all parameters of some effects together, from given values."""
+        freedom = free(self.robot, effects)
+        residual = self.residual(freedom, shift)
+        found = fit(residual, freedom.vector(values), freedom.bounds, freedom.probes, rounds)
+        return Model(tuple(effects), freedom, found, self.blocks.structure(found.errors), shift)
+
+    def shifted(self, model: Model, shift: Array) -> Model:
+        """Return a model with another shift taken off its residuals."""
+        errors = model.fit.errors + model.shift - shift
+        found = Fit(model.fit.z, errors, model.fit.jacobian, cost(errors))
+        return Model(model.effects, model.freedom, found, self.blocks.structure(errors), shift)
+
+    def polished(self, model: Model, spread: float = 0.25) -> Model:
+        """Search about a fit without slopes."""
+        freedom, residual = model.freedom, self.residual(model.freedom, model.shift)
+        wide = np.array([spread * ROUGH_SPREAD.get(c.parameter.field, 1.0) for c in freedom.coordinates])
+        z, least = rough_search(lambda at: cost(residual(at)), model.fit.z, wide, freedom.bounds, self.rng)
+        if least >= model.cost:
+            return model
+        errors = residual(z)
+        found = Fit(z, errors, model.fit.jacobian, cost(errors))
+        return Model(model.effects, freedom, found, self.blocks.structure(errors), model.shift)
+
+    def slopes(self, model: Model) -> Array:
+        """Return a model's own slopes; the last model's are kept."""
+        if self._kept_slopes[0] is not model:
+            freedom, found = model.freedom, model.fit
+            slopes = jacobian(
+                self.residual(freedom, model.shift), found.z, found.errors, freedom.probes, freedom.bounds[1]
+            )
+            self._kept_slopes = (model, slopes)
+        return self._kept_slopes[1]
+
+    def extra_slopes(
+        self, model: Model, freedom: Freedom, z: Array, residual: Callable[[Array], Array]
+    ) -> Array:
+        """Return how residuals feel the parameters a freedom has beyond a model's, shape (n, parameters)."""
+        columns = []
+        for k in range(len(model.fit.z), len(z)):
+            moved = z.copy()
+            step = (
+                freedom.probes[k] if z[k] + freedom.probes[k] <= freedom.bounds[1][k] else -freedom.probes[k]
+            )
+            moved[k] += step
+            columns.append((residual(moved) - model.fit.errors) / step)
+        return np.stack(columns, axis=1)
+
+    def beside(self, model: Model, g: Array) -> Array:
+        """Project a model's own parameters out of weighted slopes; what vanishes is dropped."""
+        own = self.slopes(model) * np.sqrt(weights(model.fit.errors))[:, None]
+        if own.shape[1]:
+            basis = np.linalg.qr(own)[0]
+            g = g - basis @ (basis.T @ g)
+        kept: Array = g[:, np.sqrt(np.sum(g * g, axis=0)) > 1e-6]
+        return kept

@@ -1,0 +1,67 @@
+"""Proof of a step: what it gains on left-out recordings, against what no cause gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fits import Fits
+from gecar.reality.fitting import costs, weights
+from gecar.reality.freedom import free
+from gecar.reality.model import Model, Step
+
+Array = npt.NDArray[np.float64]
+
+NULLS = 500
+
+
+def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
+    """Judge a step by leaving out recordings, and against the null."""
+    new = step.model
+    left_out = _left_out(fits, new) if len(np.unique(fits.blocks.folds)) > 1 else None
+    before = np.bincount(fits.blocks.folds, costs(step.base.fit.errors))
+    gains = before - left_out if left_out is not None else np.array([step.gain])
+    nulls = null(fits, catalogue, new)
+    p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
+    return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)
+
+
+def _left_out(fits: Fits, model: Model) -> Array:
+    """Return each fold's cost under parameters fitted without it (one Newton step back), shape (folds,)."""
+    slopes, errors, z = fits.slopes(model), model.fit.errors, model.fit.z
+    w = weights(errors)
+    out = np.zeros(int(fits.blocks.folds.max()) + 1)
+    normal = slopes.T @ (w[:, None] * slopes)
+    ridge = 1e-6 * np.diag(np.maximum(np.diag(normal), 1e-9))
+    for k in np.unique(fits.blocks.folds):
+        rows = fits.blocks.folds == k
+        part = slopes[rows].T @ (w[rows, None] * slopes[rows])
+        pull = slopes[rows].T @ (w[rows] * errors[rows])
+        without = np.clip(z + np.linalg.solve(normal - part + ridge, pull), *model.freedom.bounds)
+        out[k] = float(np.sum(costs(fits.residual(model.freedom, model.shift)(without)[rows])))
+    return out
+
+
+def null(fits: Fits, catalogue: Sequence[str], model: Model) -> Array:
+    """Return the largest gain any effect reaches where there is no cause, for many draws, shape (NULLS,)."""
+    errors = model.fit.errors
+    w = np.sqrt(weights(errors))
+    spans = int(fits.blocks.spans.max()) + 1
+    signs = fits.rng.choice((-1.0, 1.0), (NULLS, spans))
+    best = np.zeros(NULLS)
+    for effect in catalogue:
+        if effect in model.effects:
+            continue
+        freedom = free(fits.robot, (*model.effects, effect))
+        slopes = fits.extra_slopes(
+            model, freedom, freedom.vector(model.values), fits.residual(freedom, model.shift)
+        )
+        g = fits.beside(model, slopes * w[:, None])
+        if g.shape[1]:
+            q = np.linalg.qr(g)[0] * (w * errors)[:, None]
+            score = np.stack([np.bincount(fits.blocks.spans, column, spans) for column in q.T], axis=1)
+            best = np.maximum(best, 0.5 * np.sum((signs @ score) ** 2, axis=1))
+    return best
