@@ -391,7 +391,10 @@ def test_a_preset_is_changed_setting_by_setting_and_replaced_as_a_whole() -> Non
         ({"sed": 1}, "my.toml, sed: found an unknown field, expected one of preset, course"),
         ({"seed": -1}, "my.toml, seed: found -1, expected greater than or equal to 0"),
         ({"workers": 0}, "my.toml, workers: found 0, expected greater than or equal to 1"),
-        ({"executor": "cloud"}, "my.toml, executor: found 'cloud', expected 'process', 'thread', 'serial' or 'dask'"),
+        (
+            {"executor": "cloud"},
+            "my.toml, executor: found 'cloud', expected 'process', 'thread', 'serial' or 'dask'",
+        ),
         ({"noise": float("nan")}, "my.toml, noise: found nan, expected"),
         ({"step_s": 1.0}, "my.toml, step_s: found 1.0, expected less than or equal to 0.01"),
         ({"search": 3}, "my.toml, search: found 3, expected a table of settings"),
