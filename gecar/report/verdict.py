@@ -35,7 +35,9 @@ def _headline(verdict: Verdict) -> str:
         "nothing": "Nothing is missing: the simulation follows these recordings down to the sensors' noise.",
         "missing": f"Missing in the simulation: {names}.",
         "unexplained": "Something is missing, and nothing in the catalogue explains it.",
-        "missing_and_unexplained": f"Missing in the simulation: {names}; and something that nothing in the catalogue explains.",
+        "missing_and_unexplained": (
+            f"Missing in the simulation: {names}; and something that nothing in the catalogue explains."
+        ),
     }[verdict.verdict]
 
 
