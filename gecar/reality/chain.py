@@ -34,6 +34,8 @@ class Limits:
 # linger while the sensor crosses an edge.
 MOTION = Limits(floor=0.7, least_drop=0.1, unexplained=2.5)
 SIGHT = Limits(floor=6.0, least_drop=1.5, unexplained=25.0)
+NEARLY = 0.8  # of the best effect's gain: clocks that gain this come first
+MORE_THAN_COMMON = 1.3  # times the gain of one delay common to all: what clocks must gain
 MAIN_SHARE = 0.35  # of what is left: what an effect explains that is no stand-in
 WHOLE_SHARE = 0.85  # of all: where several effects together explain this, each may explain less
 UNEXPLAINED_SHARE = 0.1
@@ -70,7 +72,8 @@ def explain(selection: Selection) -> Explanation:
         len(steps) < MOST_EFFECTS and model.structure > _limits(selection).least_drop * selection.blocks.count
     ):
         done = selection.steps(model)
-        if selection.align(model, done[0].gain if done else 0.0):
+        common = max((step.gain for step in done if step.effect == "pose_delay"), default=0.0)
+        if selection.align(model, max(NEARLY * done[0].gain, MORE_THAN_COMMON * common) if done else 0.0):
             selection.tell("the camera's clock differs from recording to recording: taken out")
             return explain(selection)
         tried.append(tuple(done))

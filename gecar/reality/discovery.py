@@ -27,7 +27,7 @@ from gecar.reality.noise import Noise, estimate_noise
 from gecar.reality.recording import Case, Recording
 from gecar.reality.selection import Selection
 from gecar.reality.uncertainty import intervals
-from gecar.reality.verdict import Found, Judgement, Place, Residual, Verdict
+from gecar.reality.verdict import Found, Judgement, Residual, Verdict
 from gecar.reality.whiteness import whiteness
 from gecar.world.course import Course, load_course
 from gecar.world.effects import CATALOGUE
@@ -67,6 +67,10 @@ class Evidence:
     moved: Explanation
     sight: Selection | None
     seen: Explanation | None
+    where: Map
+    strips: tuple[Strip, ...]
+    held: tuple[Strip, ...]
+    before: Robot
 
     def __str__(self) -> str:
         words = [_told("motion", self.motion, self.moved)]
@@ -146,7 +150,8 @@ def discover(
     if sight and seen:
         more, others = _found(shop, sight, seen, found_robot)
         found, rivals = found + more, rivals + others
-    located = _locate(shop, motion, sight)
+    where = _map(shop, motion, sight)
+    located = where.places(np.random.default_rng(seed))
     unexplained = moved.unexplained or bool(seen and seen.unexplained)
     verdict = (
         ("missing_and_unexplained" if found else "unexplained")
@@ -170,7 +175,9 @@ def discover(
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
         notes=_notes(shop, motion),
-        evidence=Evidence(motion, moved, sight, seen),
+        evidence=Evidence(
+            motion, moved, sight, seen, where, tuple(shop.strips), tuple(shop.held), shop.robot
+        ),
     )
 
 
@@ -267,12 +274,12 @@ def _found(
     return tuple(out), tuple(rivals)
 
 
-def _locate(shop: _Workshop, motion: Selection, sight: Selection | None) -> tuple[Place, ...]:
+def _map(shop: _Workshop, motion: Selection, sight: Selection | None) -> Map:
     parts = [(motion.nothing.fit.errors, motion.cells)]
     if sight is not None:
         where = np.array([shop.strips.index(s) for s in sight.comparison.strips], np.int32)
         parts.append((sight.nothing.fit.errors, replace(sight.cells, recording=where[sight.cells.recording])))
-    return Map(shop.strips, parts, shop.robot.physics).places(np.random.default_rng(shop.seed))
+    return Map(shop.strips, parts, shop.robot.physics)
 
 
 def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ NEIGHBOURS = 5.5  # coordinates
 # Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor.
 ROUGH = frozenset({"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction"})
 ROUGH_SHARE = 0.3  # of the best effect's gain: less is not worth the search
-RESTARTS = 3
+RESTARTS, SHORT, FINALISTS = 6, 8, 2  # places searched from, generations there, and how many are searched on
 STUCK, STUCK_SPREAD = (
     1.5,
     1.5,
@@ -132,9 +132,14 @@ def _search(fits: Fits, trial: _Trial) -> Model:
     def cost_of(tail: Array) -> float:
         return cost(residual(np.r_[model.fit.z, tail]))
 
+    bounds = (low[own], high[own])
+    short = [
+        rough_search(cost_of, z[own], spread, bounds, fits.rng, SHORT) for z in (*trial.places, trial.fit.z)
+    ]
+    short.sort(key=lambda pair: pair[1])
     best, least = trial.fit.z, trial.fit.cost
-    for place in (*trial.places, trial.fit.z):
-        tail, found = rough_search(cost_of, place[own], spread, (low[own], high[own]), fits.rng)
+    for place, _ in short[:FINALISTS]:
+        tail, found = rough_search(cost_of, place, 0.6 * spread, bounds, fits.rng)
         if found < least:
             best, least = np.r_[model.fit.z, tail], found
     return fits.polished(fits.refit(trial.effects, freedom.values(best), shift=model.shift))

@@ -65,7 +65,7 @@ class Selection(Fits):
         self.nothing = self.bare()
 
     def align(self, model: Model, gain: float) -> bool:
-        """Set each camera's clock, if that explains more than the best effect's ``gain``; return whether it did.
+        """Set each camera's clock, if that gains more than ``gain``; return whether it did.
 
         After that, a delay of the camera common to all recordings is no effect any more.
         """
@@ -74,7 +74,7 @@ class Selection(Fits):
         physics = model.freedom.physics(model.fit.z)
         offsets, least = fitted_offsets(self.comparison, lambda: self.comparison.errors(physics))
         standing = cost(self.comparison.errors(physics))
-        if standing - least < max(0.8 * gain, LEAST_GAIN * self.blocks.count) or not scattered(offsets):
+        if standing - least < max(gain, LEAST_GAIN * self.blocks.count) or not scattered(offsets):
             return False
         self.clocked = True
         self.comparison.set_offsets(offsets)

@@ -96,6 +96,20 @@ def _slew(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  #
         yield {"rate_pct_s": rate}
 
 
+def _line(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    for dx in (-0.024, -0.012, 0.0, 0.012, 0.024):
+        for dy in (-0.024, -0.012, 0.0, 0.012, 0.024):
+            for angle in (-0.012, 0.0, 0.012):
+                yield {"dx_m": dx, "dy_m": dy, "angle_rad": angle}
+
+
+def _mount(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+    sensor = robot.colour_sensor
+    for ahead in (-0.02, -0.01, 0.0, 0.01, 0.02):
+        for left in (-0.02, -0.01, 0.0, 0.01, 0.02):
+            yield {"ahead_m": max(sensor.ahead + ahead, 0.0), "left_m": sensor.left + left}
+
+
 def _positive(*labels_sizes: tuple[str, tuple[float, ...]]) -> list[Values]:
     return [{label: size} for label, sizes in labels_sizes for size in sizes]
 
@@ -107,6 +121,8 @@ _SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = 
     "slippery_patch": _patch,
     "speed_limit": _speed_limit,
     "command_slew": _slew,
+    "line_shift": _line,
+    "sensor_position": _mount,
     "backlash": lambda robot, recordings: _positive(("angle_deg", (2.0, 5.0, 10.0))),  # noqa: ARG005
     "actuation_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.03, 0.08))),  # noqa: ARG005
     "tyre_friction": lambda robot, recordings: _positive(("coefficient", (0.6, 0.35, 0.15, 1.2))),  # noqa: ARG005

@@ -14,7 +14,7 @@ from gecar.reality.model import Model
 
 Array = npt.NDArray[np.float64]
 
-LOUD = 6.0  # structure a block above which small changes are not looked at
+LOUD = 2.0  # structure a block above which small changes are not looked at
 SUBTLE = 0.4  # of a size worth a name: how far off a robot's constants are expected to be without an effect
 
 

@@ -15,8 +15,9 @@ Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96
 SYSTEMATIC = 0.02  # of an effect's size: against the 3D engine, fitted parameters come back within so much
 SYSTEMATIC_STEP = 0.15  # of the smallest size worth a name
-# Gears that give add to their play: 5 to 12 % there. Clipped readings bind gain and offset to each other.
+# Gears that give add to their play: 0.3 to 0.8 degrees there. Clipped readings bind gain and offset to each other.
 MORE_SYSTEMATIC = {"backlash": 0.12, "sensor_gain": 0.12, "sensor_offset": 0.2, "dead_band": 0.05}
+MORE_STEP = {"backlash": 0.6, "sensor_offset": 1.0}
 FLAT = 2.0  # coordinates: a deviation so large comes from slopes that say nothing
 NOTICED = 12.0  # of cost: what walking along a flat parameter must not raise it by
 
@@ -54,9 +55,8 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
     low, high = model.freedom.bounds
     for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
         z = float(model.fit.z[k])
-        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + (
-            SYSTEMATIC_STEP if c.parameter.worthwhile > 0.0 else 0.0
-        )
+        step = MORE_STEP.get(c.parameter.field, SYSTEMATIC_STEP) if c.parameter.worthwhile > 0.0 else 0.0
+        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + step
         if sd > FLAT:
             down, up = (
                 _walked(selection, model, k, side, abs(end - z))

@@ -1,0 +1,149 @@
+"""Discovering what a simulation lacks: on recordings made by the simulation itself with an effect concealed.
+
+The proof that counts is on recordings of other worlds: `benchmarks/concealed`, and the practice cases below.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gecar.errors import InputError
+from gecar.plots.discovery import verdict_figures
+from gecar.reality.discovery import discover
+from gecar.reality.formula import NAMES
+from gecar.reality.holdout import split
+from gecar.reality.recording import Case, Recording, make_recording, read_case
+from gecar.reality.replay import Film
+from gecar.reality.rough_search import rough_search
+from gecar.reality.setup import Setup
+from gecar.reality.verdict import Verdict
+from gecar.report.verdict import sentences
+from gecar.report.verdict_page import verdict_page
+from gecar.world.robot import Robot, load_robot
+
+EV3 = load_robot("ev3")
+SHARED = Path(__file__).parents[2] / "shared" / "recordings"
+
+
+def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor") -> Recording:
+    """Held duties drawn by chance, encoders in whole degrees, a camera at 33 Hz with 1 mm and 0.3 degrees of noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 0.01)
+    duty = np.repeat(rng.integers(-7, 8, (2, int(seconds / 0.8) + 1)) * 10, 80, axis=1)[:, : len(t)].astype(
+        float
+    )
+    columns = {"t_s": t, "left_duty_pct": duty[0], "right_duty_pct": duty[1]}
+    setup = Setup(rig=rig, course="none")
+    rows = Film(make_recording("made", columns, setup)).play(robot.physics, np.array([1.0, 0.5, 0.3]))[0]
+    columns |= {
+        "left_angle_deg": np.round(np.degrees(rows[:, 0])),
+        "right_angle_deg": np.round(np.degrees(rows[:, 1])),
+    }
+    if rig == "floor":
+        frames = np.where(np.arange(len(t)) % 3 == 0, 0.0, np.nan)
+        columns["x_m"] = rows[:, 4] + rng.normal(0, 0.001, len(t)) + frames
+        columns["y_m"] = rows[:, 5] + rng.normal(0, 0.001, len(t)) + frames
+        columns["heading_deg"] = np.degrees(rows[:, 6]) + rng.normal(0, 0.3, len(t)) + frames
+    return make_recording(f"run_{seed}", columns, setup)
+
+
+@cache
+def verdict_on(effect: str = "", label: str = "", value: float = 0.0, rig: str = "floor") -> Verdict:
+    robot = EV3.with_effects({effect: {label: value}}) if effect else EV3
+    return discover(Case("made", tuple(recorded(robot, seed, rig=rig) for seed in range(5))))
+
+
+def test_nothing_concealed_is_nothing_found() -> None:
+    verdict = verdict_on()
+    assert verdict.verdict == "nothing"
+    assert verdict.effects == ()
+    assert verdict.residual.white
+
+
+def test_a_late_motor_is_named_with_its_delay() -> None:
+    found = verdict_on("actuation_delay", "time_s", 0.03).effects
+    assert [f.id for f in found] == ["actuation_delay"]
+    interval = found[0].parameters["time_s"]
+    assert interval.low < 0.03 < interval.high
+    assert found[0].holdout_gain > found[0].null_95
+
+
+def test_a_verdict_closes_the_gap_on_recordings_it_never_fitted() -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    assert not set(verdict.fitted_on) & set(verdict.judgement.recordings)
+    assert verdict.judgement.gap_closed is not None
+    assert verdict.judgement.gap_closed > 0.9
+
+
+def test_a_bench_needs_no_camera() -> None:
+    verdict = verdict_on("viscous_friction", "coefficient_nms", 0.004, rig="bench")
+    assert "viscous_friction" in {verdict.effects[0].id, *verdict.effects[0].alternatives}
+
+
+def test_the_verdicts_json_keeps_the_contract() -> None:
+    table = verdict_on("actuation_delay", "time_s", 0.03).as_json()
+    assert set(table) == {"verdict", "effects", "located", "holdout", "residual", "next_recording"}
+    assert set(table["effects"][0]) == {"id", "or", "parameters", "evidence"}
+    assert set(table["effects"][0]["evidence"]) == {"holdout_gain", "null_95", "p"}
+    assert set(table["holdout"]) == {"recordings", "channels", "before", "after", "floor", "gap_closed"}
+    assert set(table["located"][0]) >= {"channel", "regime", "share", "p", "times_s", "place"}
+    json.dumps(table)
+
+
+def test_the_words_name_effect_size_and_proof() -> None:
+    words = " ".join(sentences(verdict_on("actuation_delay", "time_s", 0.03)))
+    assert "commands act late" in words
+    assert "recordings not used for the fit" in words
+
+
+def test_pictures_and_page_are_whole() -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    figures = verdict_figures(verdict)
+    assert set(figures) == {"gap", "where", "tried", "traces", "map"}
+    assert "commands act late" in verdict_page(verdict, {"gap": b"\x89PNG"})
+
+
+def test_one_recording_is_split_by_time() -> None:
+    parts = split(Case("one", (recorded(EV3, 1),)))
+    assert parts.by_time
+    assert parts.fitted[0].t_s[-1] < parts.held[0].t_s[-1]
+    assert np.isnan(parts.held[0].x_m[:100]).all()
+
+
+def test_an_unknown_holdout_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match="--holdout: found 'run_9'"):
+        split(Case("made", (recorded(EV3, 1), recorded(EV3, 2))), ["run_9"])
+
+
+def test_rough_search_finds_the_bottom_of_a_jagged_bowl() -> None:
+    def jagged(z: np.ndarray) -> float:
+        return float(np.sum((z - 0.7) ** 2) + 0.05 * np.sum(np.cos(40 * z)))
+
+    bounds = np.full(3, -5.0), np.full(3, 5.0)
+    found, cost = rough_search(jagged, np.zeros(3), np.ones(3), bounds, np.random.default_rng(0), 60)
+    assert np.all(np.abs(found - 0.7) < 0.2)
+    assert cost < 0.0
+
+
+def test_every_term_of_a_formula_has_one_name() -> None:
+    assert len(set(NAMES)) == len(NAMES)
+
+
+needs_practice = pytest.mark.skipif(
+    not (SHARED / "practice").is_dir(), reason="the practice cases (../shared/recordings) are not here"
+)
+
+
+@needs_practice
+def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
+    verdict = discover(read_case(SHARED / "practice" / "p08"))
+    assert [f.id for f in verdict.effects] == ["floor_tilt"]
+    tilt = verdict.effects[0].parameters["x_rad"]
+    assert tilt.low < 0.06 < tilt.high
+    assert verdict.judgement.gap_closed is not None
+    assert verdict.judgement.gap_closed > 0.9
