@@ -106,8 +106,11 @@ def test_the_line_that_drives_is_lit(page, drive, tmp_path):
 
 @in_chromium
 def test_it_plays(page, tmp_path):
-    dom = opened(page, tmp_path, "--dump-dom", after="#t=3&play", budget=3000)
-    assert float(re.search('data-time="(.*?)"', dom).group(1)) > 3.0
+    for budget in (3000, 10_000, 30_000):  # a busy machine draws few frames
+        dom = opened(page, tmp_path, "--dump-dom", after="#t=3&play", budget=budget)
+        if float(re.search('data-time="(.*?)"', dom).group(1)) > 3.0:
+            return
+    raise AssertionError(f"no frame was played in {budget} ms")
 
 
 @in_chromium
