@@ -83,4 +83,6 @@ def _draw(verdict: Verdict, out: Path) -> None:
     from gecar.report.verdict_page import verdict_page
 
     paths = {name: save(figure, out / f"{name}.png") for name, figure in verdict_figures(verdict).items()}
-    write_whole(out / "report.html", verdict_page(verdict, {name: path.read_bytes() for name, path in paths.items()}))
+    write_whole(
+        out / "report.html", verdict_page(verdict, {name: path.read_bytes() for name, path in paths.items()})
+    )
