@@ -56,7 +56,7 @@ def gap_figure(verdict: Verdict) -> Figure:
     """Draw each channel's misfit on the recordings set aside: before, after, and what noise leaves."""
     channels = verdict.judgement.channels
     names = list(channels)
-    figure = new_figure(8.0, 1.4 + 0.45 * len(names))
+    figure = new_figure(8.0, 2.2 + 0.4 * len(names))
     with look():
         axes = figure.add_subplot()
         at = np.arange(len(names))[::-1]
@@ -112,7 +112,7 @@ def tried_figure(verdict: Verdict) -> Figure:
     evidence: Evidence = verdict.evidence
     stages = [*evidence.moved.tried, *(evidence.seen.tried if evidence.seen else ())]
     stages = [s for s in stages if s][:4]
-    figure = new_figure(8.0, 1.4 + 1.5 * max(len(stages), 1))
+    figure = new_figure(8.0, 2.0 + 1.5 * max(len(stages), 1))
     taken = {found.id: found.null_95 for found in verdict.effects}
     with look():
         for number, steps in enumerate(stages):
@@ -142,7 +142,7 @@ def traces_figure(verdict: Verdict) -> Figure:
     film = strip.film
     before, after = film.play(evidence.before.physics), film.play(verdict.robot.physics)
     seen = [name for name in _SCALES if _has(strip, name)]
-    figure = new_figure(9.0, 1.2 + 1.1 * len(seen))
+    figure = new_figure(9.0, 2.0 + 1.1 * len(seen))
     with look():
         for number, name in enumerate(seen):
             axes = figure.add_subplot(len(seen), 1, number + 1)

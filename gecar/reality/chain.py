@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gecar.reality.model import Model, Step
+from gecar.reality.model import Model, Step, worthwhile
 from gecar.reality.screening import ROUGH
 from gecar.reality.selection import Selection
 
 MOST_EFFECTS = 4
+SWAPPED = 4  # of each stage's runners-up are tried in the place of what was taken
 
 
 @dataclass(frozen=True)
@@ -102,14 +103,17 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
     if not kept:
         return selection.nothing
     best = kept[-1].model
-    for number, step in enumerate(list(kept[:-1])):
-        for other in tried[number][1:4]:
-            if other.effect in best.effects or not other.worthwhile:
+    rivals = {step.effect: step for stage in tried for step in stage[:SWAPPED]}
+    for number, step in enumerate(list(kept)):
+        if len(kept) < 2:
+            break
+        for other in rivals.values():
+            if other.effect in best.effects:
                 continue
             rest = [e for e in best.effects if e != step.effect]
             values = {**best.values, **other.model.values}
             swapped = selection.refit((*rest, other.effect), values, shift=best.shift)
-            if swapped.cost < best.cost - step.null_95:
+            if swapped.cost < best.cost - step.null_95 and worthwhile(swapped, other.effect):
                 best = swapped
                 kept[number] = replace(step, effect=other.effect)
                 break

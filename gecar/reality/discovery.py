@@ -21,6 +21,7 @@ from gecar.reality.confusion import alternatives
 from gecar.reality.fitting import cost
 from gecar.reality.formula import describe
 from gecar.reality.holdout import Split, judge, split
+from gecar.reality.known_robot import known_robot
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
 from gecar.reality.noise import Noise, estimate_noise
@@ -31,7 +32,7 @@ from gecar.reality.verdict import Found, Judgement, Residual, Verdict
 from gecar.reality.whiteness import whiteness
 from gecar.world.course import Course, load_course
 from gecar.world.effects import CATALOGUE
-from gecar.world.robot import Robot, load_robot
+from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -190,7 +191,7 @@ def _open(
     tell: Callable[[str], None],
 ) -> _Workshop:
     parts = split(case, holdout)
-    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
+    known = robot if robot is not None else known_robot(case.recordings[0])
     noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
     courses: dict[str, Course | None] = {}
 
@@ -222,6 +223,9 @@ def _seen(shop: _Workshop) -> tuple[str, ...]:
         hidden |= _FLOOR_ONLY
     if all(np.isnan(r.left_duty).all() or np.isnan(r.right_duty).all() for r in fitted):
         hidden |= _TWO_MOTORS
+    duties = np.concatenate([r.commands.ravel() for r in fitted])
+    if duties.min() >= 0.0 or duties.max() <= 0.0:
+        hidden |= {"friction_asymmetry"}
     if not any(len(s.film.reel.pose_t) for s in shop.strips):
         hidden |= {"pose_delay", "slippery_patch"}
     return tuple(e for e in _MOTION if e not in hidden)

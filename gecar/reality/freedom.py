@@ -31,6 +31,8 @@ _SHAPES = {
     "patch_y": 0.03,
 }
 _FAR_LOW = 1e-9
+EV3_STALL_TORQUE, EV3_INERTIA = 0.433, 0.00248  # N m, kg m^2: the catalogue's bounds are meant for these
+ALIKE = 4.0  # a drive at most so many times stronger or weaker keeps the EV3's bounds
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,14 @@ class Coordinate:
         Which.
     neutral
         Its value in the robot as it stands, in the parameter's unit.
+    scale
+        How many times larger than an EV3's the robot's torques of this kind are; it stretches bounds and steps.
     """
 
     effect: Effect
     parameter: Parameter
     neutral: float
+    scale: float = 1.0
 
     @property
     def inverse(self) -> bool:
@@ -63,7 +68,7 @@ class Coordinate:
     def step(self) -> float:
         """What one coordinate is, in the parameter's unit (finite neutrals)."""
         p = self.parameter
-        return p.worthwhile if p.worthwhile > 0.0 else _SHAPES[p.field]
+        return p.worthwhile * self.scale if p.worthwhile > 0.0 else _SHAPES[p.field]
 
     def value(self, z: float) -> float:
         """Return the parameter's value at a coordinate."""
@@ -72,7 +77,7 @@ class Coordinate:
             return p.neutral or math.inf if z <= 0.0 else max((p.start or p.low) / z, p.low)
         if self.ratio:
             return min(max(self.neutral * math.exp(z), p.low), p.high)
-        return min(max(self.neutral + z * self.step, p.low), p.high)
+        return min(max(self.neutral + z * self.step, p.low), p.high * self.scale)
 
     def at(self, value: float) -> float:
         """Return the coordinate of a value."""
@@ -86,7 +91,7 @@ class Coordinate:
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest coordinate."""
         ends = [self.at(max(self.parameter.low, _FAR_LOW) if self.ratio else self.parameter.low)]
-        ends.append(self.at(self.parameter.high))
+        ends.append(self.at(self.parameter.high * self.scale))
         return min(ends), max(ends)
 
     @property
@@ -156,11 +161,23 @@ def free(robot: Robot, effect_ids: Sequence[str]) -> Freedom:
     return Freedom(
         robot,
         tuple(
-            Coordinate(BY_ID[i], p, _standing(robot, BY_ID[i], p))
+            Coordinate(BY_ID[i], p, _standing(robot, BY_ID[i], p), torque_scale(robot, p.unit))
             for i in effect_ids
             for p in BY_ID[i].parameters
         ),
     )
+
+
+def torque_scale(robot: Robot, unit: str = "N m") -> float:
+    """Return how many times larger than an EV3's a robot's torques are: by stall torque; per speed, by inertia."""
+    m = robot.motor
+    if unit == "N m":
+        ratio = m.torque_constant * robot.battery.voltage / m.resistance / EV3_STALL_TORQUE
+    elif unit == "N m s/rad":
+        ratio = m.inertia / EV3_INERTIA
+    else:
+        return 1.0
+    return ratio if not 1.0 / ALIKE < ratio < ALIKE else 1.0
 
 
 def _standing(robot: Robot, effect: Effect, parameter: Parameter) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.freedom import Coordinate, free
+from gecar.reality.freedom import Coordinate, free, torque_scale
 from gecar.reality.recording import Recording
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
@@ -20,6 +20,7 @@ from gecar.world.robot import Robot
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
 
+LEAST_CYCLES = 2.0
 _SIZES = (3.0, 12.0)  # in steps worth a name
 
 
@@ -42,14 +43,14 @@ def _sizes(c: Coordinate) -> Iterator[float]:
         return
     for z in _SIZES:
         for side in (z, -z):
-            if c.parameter.low <= c.neutral + side * c.step <= c.parameter.high:
+            if c.parameter.low <= c.neutral + side * c.step <= c.parameter.high * c.scale:
                 yield c.value(side)
 
 
 def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
     for speed in (0.3, 1.0, 3.0):
         for torque in (0.005, 0.02):
-            yield {"extra_torque_nm": torque * _torque_scale(robot), "speed_rad_s": speed}
+            yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": speed}
 
 
 def _torque_scale(robot: Robot) -> float:
@@ -68,11 +69,20 @@ def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values
         yield {"duty_pct": float(edge), "offset_share": 0.0}
 
 
-def _ripple(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
-    size = 0.01 * _torque_scale(robot)
+def _ripple(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
+    """Scan cycles of which the shafts have turned two at least: less could be any force along the way."""
+    turned = max(float(np.nanmax(np.ptp(_known(r), axis=0))) for r in recordings) / (2.0 * math.pi)
+    size = 0.01 * torque_scale(robot)
     for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
+        if cycles * turned < LEAST_CYCLES:
+            continue
         for phase in (-0.75 * math.pi, -0.25 * math.pi, 0.25 * math.pi, 0.75 * math.pi):
             yield {"amplitude_nm": size, "cycles_per_rev": float(cycles), "phase_rad": phase}
+
+
+def _known(recording: Recording) -> Array:
+    """Return the wheel angles [rad] without gaps, shape (rows, 2); 0 where there are none."""
+    return np.nan_to_num(np.column_stack([recording.left_angle_rad, recording.right_angle_rad]))
 
 
 def _patch(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
