@@ -7,6 +7,8 @@ longer to import than anyone waits for help.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -105,13 +107,25 @@ class Commands(TyperGroup):
             command.name = name
         return name, command, rest
 
+    def make_context(self, *words: Any, **settings: Any) -> Any:
+        """Read the command line."""
+        with _ctrl_c_answered():
+            return super().make_context(*words, **settings)
+
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; Ctrl-C ends it with a word and without a traceback."""
-        try:
+        """Run the command."""
+        with _ctrl_c_answered():
             return super().invoke(ctx)
-        except KeyboardInterrupt:
-            print("stopped", file=sys.stderr)
-            raise typer.Exit(130) from None
+
+
+@contextmanager
+def _ctrl_c_answered() -> Iterator[None]:
+    """End on Ctrl-C with a word and without a traceback, before typer ends without either."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        raise typer.Exit(130) from None
 
 
 def _version(wanted: bool) -> None:
