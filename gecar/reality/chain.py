@@ -9,6 +9,9 @@ from gecar.reality.screening import ROUGH
 from gecar.reality.selection import Selection
 
 MOST_EFFECTS = 4
+WAYS = 3  # of the first stage's effects a chain may begin with
+FAR_BEHIND = 0.3  # of the best gain: no way to begin with less
+NEARLY_STOOD = 0.75  # of the structure: a chain that explains so much is worth another beginning
 SWAPPED = 4  # of each stage's runners-up are tried in the place of what was taken
 
 
@@ -65,26 +68,31 @@ class Explanation:
 
 
 def explain(selection: Selection) -> Explanation:
-    """Take effects one by one as long as each proves itself; abstain where they only imitate."""
-    model = selection.nothing
-    steps: list[Step] = []
-    tried: list[tuple[Step, ...]] = []
-    while (
-        len(steps) < MOST_EFFECTS and model.structure > _limits(selection).least_drop * selection.blocks.count
+    """Take effects one by one as long as each proves itself; abstain where they only imitate.
+
+    Where it takes several, other ways to begin are tried, too: the first effect may have stood in for two causes.
+    """
+    first = selection.steps(selection.nothing) if _worth_a_look(selection, selection.nothing) else []
+    common = max((step.gain for step in first if step.effect == "pose_delay"), default=0.0)
+    if selection.align(
+        selection.nothing, max(NEARLY * first[0].gain, MORE_THAN_COMMON * common) if first else 0.0
     ):
-        done = selection.steps(model)
-        common = max((step.gain for step in done if step.effect == "pose_delay"), default=0.0)
-        if selection.align(model, max(NEARLY * done[0].gain, MORE_THAN_COMMON * common) if done else 0.0):
-            selection.tell("the camera's clock differs from recording to recording: taken out")
-            return explain(selection)
-        tried.append(tuple(done))
-        step = _best(selection, done)
-        if step is None:
-            break
-        selection.tell(f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left")
-        steps.append(step)
-        model = step.model
-    kept = steps[: _kept(selection, steps)]
+        selection.tell("the camera's clock differs from recording to recording: taken out")
+        return explain(selection)
+    began = _chain(selection, first)
+    if began is None:  # clocks came forward on the way
+        return explain(selection)
+    ways = [began]
+    if len(began.steps) > 1 or (not began.steps and began.nearly):
+        others = [
+            step for step in first[1:WAYS] if step.worthwhile and step.gain > FAR_BEHIND * first[0].gain
+        ]
+        ways += [way for way in (_chain(selection, [step]) for step in others) if way is not None]
+    best = min(
+        ways, key=lambda way: (not way.steps, way.model.cost + sum(step.null_95 for step in way.steps))
+    )
+    kept = list(best.steps)
+    tried = [tuple(first), *best.tried[1:]]
     taken = _settled(selection, kept, tried)
     left = selection.rid_of_subtle(taken).structure
     floor = max(
@@ -92,6 +100,43 @@ def explain(selection: Selection) -> Explanation:
         UNEXPLAINED_SHARE * selection.nothing.structure,
     )
     return Explanation(taken, tuple(kept), tuple(tried), left > floor)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """One chain: the steps that stand, the model they end in, all that was tried, and whether it nearly stood."""
+
+    steps: tuple[Step, ...]
+    model: Model
+    tried: tuple[tuple[Step, ...], ...]
+    nearly: bool
+
+
+def _chain(selection: Selection, first: list[Step]) -> _Way | None:
+    """Go on from a first stage until nothing more proves itself; None where the cameras' clocks had to be set."""
+    model, steps, tried = selection.nothing, list[Step](), list[tuple[Step, ...]]()
+    done = first
+    while True:
+        tried.append(tuple(done))
+        step = _best(selection, done)
+        if step is None:
+            break
+        selection.tell(f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left")
+        steps.append(step)
+        model = step.model
+        if len(steps) == MOST_EFFECTS or not _worth_a_look(selection, model):
+            break
+        done = selection.steps(model)
+        common = max((each.gain for each in done if each.effect == "pose_delay"), default=0.0)
+        if selection.align(model, max(NEARLY * done[0].gain, MORE_THAN_COMMON * common) if done else 0.0):
+            return None
+    kept = steps[: _kept(selection, steps)]
+    nearly = bool(steps) and steps[0].before - steps[-1].after > NEARLY_STOOD * steps[0].before
+    return _Way(tuple(kept), kept[-1].model if kept else selection.nothing, tuple(tried), nearly)
+
+
+def _worth_a_look(selection: Selection, model: Model) -> bool:
+    return model.structure > _limits(selection).least_drop * selection.blocks.count
 
 
 def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...]]) -> Model:
@@ -132,7 +177,7 @@ def _best(selection: Selection, done: list[Step]) -> Step | None:
     for step in done[:4]:
         drop = step.before - step.after
         if (
-            not step.worthwhile
+            not all(worthwhile(step.model, effect) for effect in step.model.effects)
             or drop < _limits(selection).least_drop * selection.blocks.count
             or step.gain < 0.3 * done[0].gain
         ):

@@ -14,6 +14,10 @@ from gecar.reality.freedom import Freedom
 Array = npt.NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
 
+AT_BOUND, FAR = (
+    0.01,
+    8.0,
+)  # coordinates: where a bound is far from neutral, a fit that ends there has not ended
 HELD_DUTY = 5.0  # %: what friction holds anyway, 4 % of an EV3's duty, needs no dead band
 
 
@@ -90,7 +94,10 @@ def worthwhile(model: Model, effect: str) -> bool:
         found = model.values[effect]
         return found["duty_pct"] >= 1.0 and (found["offset_share"] > 0.3 or found["duty_pct"] >= HELD_DUTY)
     sizes = []
-    for c, z in zip(model.freedom.coordinates, model.fit.z, strict=True):
+    low, high = model.freedom.bounds
+    for k, (c, z) in enumerate(zip(model.freedom.coordinates, model.fit.z, strict=True)):
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse):
-            sizes.append(abs(z) >= (0.02 if c.inverse else 1.0))
+            # A cause has a size; what grows until it is stopped imitates another.
+            stopped = z != 0.0 and (z > high[k] - AT_BOUND or z < low[k] + AT_BOUND) and abs(z) > FAR
+            sizes.append(not stopped and abs(z) >= (0.02 if c.inverse else 1.0))
     return any(sizes)
