@@ -1,3 +1,4 @@
+import contextlib
 import json
 import os
 import shutil
@@ -178,7 +179,7 @@ def test_a_run_that_is_stopped_is_saved_and_goes_on_to_the_same_end(gecar, tmp_p
     assert process.returncode == 130, said
     assert "Traceback" not in said
     assert "--resume --out stopped" in said
-    _wait_for(lambda: not _lives(process.pid), None)
+    _wait_for(lambda: not _members(process.pid), None)
     assert len(read_history(tmp_path / "stopped")["best"]) < 61
     assert gecar("evolve", "--resume", "--out", "stopped", "--no-pictures", "--workers", 1).code == 0
     assert gecar("evolve", *small[:-2], 1, "--no-pictures", "--out", "whole").code == 0
@@ -195,22 +196,22 @@ def _wait_for(condition, process, seconds=90.0):
         time.sleep(0.02)
 
 
-def _lives(group):
-    """Whether a process group has a process that is more than a dead one's record."""
-    stats = [
-        path.read_text().rpartition(")")[2].split()
-        for path in Path("/proc").glob("[0-9]*/stat")
-        if path.exists()
-    ]
-    return any(int(stat[2]) == group and stat[0] != "Z" for stat in stats)
+def _members(group):
+    """Count the processes of a group that are more than a dead one's record."""
+    stats = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has just ended
+            stats.append(path.read_text().rpartition(")")[2].split())
+    return sum(int(stat[2]) == group and stat[0] != "Z" for stat in stats)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
-@pytest.mark.parametrize("seconds", [0.6, 1.5, 3.0])
+@pytest.mark.parametrize("seconds", [0.0, 0.5, 2.0])
 def test_ctrl_c_at_any_moment_ends_all_in_one_line(tmp_path, seconds):
     process = start(
         "evolve", "--generations", 2000, "--workers", 2, "--out", "new", cwd=tmp_path, start_new_session=True
     )
+    _wait_for(lambda: _members(process.pid) > 1, process)  # the fork server is the first thing a run starts
     time.sleep(seconds)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
@@ -218,7 +219,7 @@ def test_ctrl_c_at_any_moment_ends_all_in_one_line(tmp_path, seconds):
     assert process.returncode in (130, -signal.SIGINT), said
     assert "Traceback" not in said
     assert said.count("stopped") == 1
-    _wait_for(lambda: not _lives(process.pid), None)
+    _wait_for(lambda: not _members(process.pid), None)
 
 
 def test_progress_says_all_that_matters():
