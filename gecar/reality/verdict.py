@@ -10,6 +10,9 @@ from gecar.reality.holdout import Misfit
 from gecar.world.robot import Robot
 
 
+VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
+
+
 @dataclass(frozen=True)
 class Interval:
     """A parameter's value and 95 % interval, in its unit."""
@@ -102,7 +105,8 @@ class Judgement:
     def gap_closed(self) -> float | None:
         """Share of the gap to the floor that is closed; None where there is no gap to speak of."""
         gap = self.before - self.floor
-        return (self.before - self.after) / gap if gap > 0.2 * self.floor else None
+        seen = any(m.before > VISIBLE * m.floor for m in self.channels.values())
+        return (self.before - self.after) / gap if seen and gap > 0.0 else None
 
 
 @dataclass(frozen=True)
@@ -151,7 +155,7 @@ class Verdict:
                 "before": judged.before,
                 "after": judged.after,
                 "floor": judged.floor,
-                "gap_closed": judged.gap_closed,
+                "gap_closed": None if self.verdict == "nothing" else judged.gap_closed,
             },
             "residual": vars(self.residual),
             "next_recording": {
