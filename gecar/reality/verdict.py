@@ -9,7 +9,6 @@ from typing import Any
 from gecar.reality.holdout import Misfit
 from gecar.world.robot import Robot
 
-
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
 
