@@ -25,7 +25,7 @@ evolve: $(VENV)/.runtime  ## Evolve a program on the paper's course; results and
 	@n=1; while [ -e "$$(printf 'runs/evolve-%03d' $$n)" ]; do n=$$((n + 1)); done; \
 	$(PY) -m gecar evolve --out "$$(printf 'runs/evolve-%03d' $$n)" $(ARGS)
 
-test: $(VENV)/.test  ## Run the tests
+test: $(VENV)/.test $(VENV)/.node  ## Run the tests
 	$(PY) -m pytest -n auto $(ARGS)
 
 check: $(VENV)/.check  ## Check format, style, types and which room imports which
@@ -42,7 +42,7 @@ bench: $(VENV)/.runtime  ## Measure how fast gecar is, and print it as a table
 	$(PY) -m benchmarks $(ARGS)
 
 clean:  ## Remove .venv and what tools leave behind; runs/ stays
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) tests/node/node_modules build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A machine may have pip but not ensurepip (Debian splits it off); pip can then fill the environment from outside.
@@ -61,3 +61,10 @@ $(VENV)/.test $(VENV)/.check: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
 	@$(PIP) install --quiet --editable '.[$*]'
 	@touch $@
+
+# MicroPython for the tests of exported programs. Without npm or a network those tests are skipped, and say so.
+$(VENV)/.node: tests/node/package.json | $(PY)
+	@if ! command -v npm >/dev/null; then echo "note: found no npm, tests that run exported programs will be skipped"; \
+	else echo "Installing MicroPython into tests/node (once) ..."; \
+	npm install --prefix tests/node --silent --no-audit --no-fund --no-package-lock --fetch-retries=1 --fetch-timeout=20000 \
+	&& touch $@ || echo "note: npm could not install it, tests that run exported programs will be skipped"; fi

@@ -1,6 +1,6 @@
 """A simulated EV3: exported programs run on it under MicroPython (in node), their motors and sensor gecar's own.
 
-Needs node, and `npm install --prefix tests/node`.
+Needs node, and what `make test` installs where there is npm: `npm install --prefix tests/node`.
 """
 
 import json
@@ -13,7 +13,7 @@ PATIENCE_MS = 200_000.0
 MISSING = None
 if shutil.which("node") is None:
     MISSING = "node is not installed"
-elif not (NODE / "node_modules").is_dir():
+elif not (NODE / "node_modules" / "@micropython").is_dir():
     MISSING = "MicroPython is not installed: npm install --prefix tests/node"
 
 
