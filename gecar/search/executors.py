@@ -125,15 +125,18 @@ def prepare_workers() -> None:
 
 @contextmanager
 def sigint_ignored() -> Iterator[None]:
-    """Let processes started within ignore Ctrl-C, which is for this one to answer; only the main thread can."""
-    if threading.current_thread() is not threading.main_thread():
+    """Let processes started within never hear of Ctrl-C; this one hears of it afterwards, since it has to answer."""
+    if sys.platform == "win32":
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from multiprocessing import resource_tracker  # noqa: PLC0415  not there on every system
+
+    resource_tracker.ensure_running()  # starting it lets Ctrl-C through again, so it must not come later
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _context() -> BaseContext:
