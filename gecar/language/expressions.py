@@ -14,10 +14,13 @@ from gecar.language.statements import Comparison, Condition, Sensor
 MAX_DEPTH = 100  # of ifs and parentheses within each other
 MAX_NUMBER = 10**12
 
-_TOKEN = re.compile(
-    r"[^\S\n]*(?:#[^\n]*)?(?:(?P<line>\n)|(?P<number>[0-9]+(?:\.[0-9]*)?|\.[0-9]+)|(?P<word>[A-Za-z_]\w*)"
-    r"|(?P<mark>[<>=!]=|[-+*/(){},:;<>])|(?P<stray>\S)|\Z)"
+_SPACE = r"[^\S\n]*(?:#[^\n]*)?"
+_KINDS = (
+    r"(?P<line>\n)|(?P<number>[0-9]+(?:\.[0-9]*)?|\.[0-9]+)|(?P<word>[A-Za-z_]\w*)"
+    r"|(?P<mark>[<>=!]=|[-+*/(){},:;<>])|(?P<stray>\S)|\Z"
 )
+_TOKEN = re.compile(f"{_SPACE}(?:{_KINDS})")
+_TOKEN_OR_CALL = re.compile(rf"{_SPACE}(?:(?P<call>motor\([-+*/0-9, ]*\))|{_KINDS})")
 _SENSORS = {sensor.word: sensor for sensor in Sensor}
 _COMPARISONS = {comparison.word: comparison for comparison in Comparison}
 
@@ -33,11 +36,11 @@ class Token(NamedTuple):
     indent: int
 
 
-def _tokens(text: str) -> list[Token]:
+def _tokens(text: str, pattern: re.Pattern[str]) -> list[Token]:
     """Split a text; the last token, of kind "end", stands at its end."""
     tokens: list[Token] = []
     first, line_start = True, 0
-    for match in _TOKEN.finditer(text):
+    for match in pattern.finditer(text):
         kind = match.lastgroup
         if kind == "line":
             first, line_start = True, match.end()
@@ -51,12 +54,15 @@ def _tokens(text: str) -> list[Token]:
 
 
 class Expressions:
-    """Recursive descent; `next` is the token not yet taken, `line_indent` that of the line it stands in."""
+    """Recursive descent; `next` is the token not yet taken, `line_indent` that of the line it stands in.
 
-    def __init__(self, text: str, source: str) -> None:
+    With `calls`, a ``motor(...)`` of plain numbers is one token, of kind "call".
+    """
+
+    def __init__(self, text: str, source: str, calls: bool = False) -> None:
         self.text = text
         self.source = source
-        self.tokens = iter(_tokens(text))
+        self.tokens = iter(_tokens(text, _TOKEN_OR_CALL if calls else _TOKEN))
         self.depth = 0
         self.next = next(self.tokens)
         self.line_indent = max(self.next.indent, 0)

@@ -19,7 +19,9 @@ Duties become whole percent, times whole milliseconds and thresholds thousandths
 
 from __future__ import annotations
 
-from gecar.errors import expected
+from functools import lru_cache
+
+from gecar.errors import InputError, expected
 from gecar.language import opcodes
 from gecar.language.expressions import Expressions
 from gecar.language.statements import If, Motor, MotorUntil, Statement
@@ -47,14 +49,23 @@ def parse_statements(text: str, source: str) -> tuple[Statement, ...]:
     """
     if len(text) > MAX_CHARACTERS:
         raise expected(source, f"{len(text)} characters", f"a program of at most {MAX_CHARACTERS}")
-    return _Parser(text, source).program()
+    try:
+        return _Parser(text, source, calls=True).program()
+    except InputError:  # once more, token by token, for the place of the fault
+        return _Parser(text, source).program()
+
+
+@lru_cache(maxsize=16_384)
+def _call(text: str) -> Statement:
+    """Read a ``motor(...)`` of plain numbers; populations repeat few of them thousands of times."""
+    return _Parser(text, "<call>").motor()
 
 
 class _Parser(Expressions):
     """Recursive descent through statements and the expressions in them."""
 
-    def __init__(self, text: str, source: str) -> None:
-        super().__init__(text, source)
+    def __init__(self, text: str, source: str, calls: bool = False) -> None:
+        super().__init__(text, source, calls)
         self.statements = 0
 
     def program(self) -> tuple[Statement, ...]:
@@ -70,7 +81,9 @@ class _Parser(Expressions):
         self.statements += 1
         if self.statements > MAX_STATEMENTS:
             raise self.fault(f"a program of at most {MAX_STATEMENTS} statements")
-        if word == "motor":
+        if self.next.kind == "call":
+            statements.append(_call(self.take().text))
+        elif word == "motor":
             statements.append(self.motor())
         elif word == "if":
             statements.append(self.conditional())
