@@ -101,6 +101,22 @@ def test_convergence_says_when_nobody_is_at_goal():
     assert words == ["14.20 s"]
 
 
+@pytest.mark.parametrize("last", [16.5, 16.74, 17.0, 11.8])
+def test_words_about_the_best_and_the_paper_stay_apart(last):
+    axes = convergence(history([20.0, last]), REFERENCES).axes[0]
+    style.settle(axes.figure)
+    boxes = [text.get_window_extent() for text in axes.texts if text.get_text().endswith(" s")]
+    assert len(boxes) == 3
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+
+
+def test_words_over_the_edge_are_found():
+    figure = style.new_figure(2.0, 1.0)
+    assert style.is_whole(figure)
+    figure.text(0.5, 0.5, "words that are wider than the picture they stand in")
+    assert not style.is_whole(figure)
+
+
 def test_runs_beside_each_other_show_everything_within_their_edges():
     late, soon, never = history([1e4, 1e4, 20.0]), history([30.0, 20.0]), history([1e4])
     figure = compare_runs({"one": [late, soon, never], "other": [never]}, REFERENCES, "A title", "a detail")

@@ -91,17 +91,11 @@ def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence
     if not solved.all():
         _shade_unsolved(axes, generation, int(solved.argmax()) if solved.any() else len(solved))
     if solved.any():
-        last = f"{best[-1]:.2f} s"
+        # Beside the axes, where no reference's words are, however near its time.
         axes.annotate(
-            last,
-            (generation[-1], best[-1]),
-            (-4, -14),
-            textcoords="offset points",
-            ha="right",
-            weight="bold",
-            color=BLUE,
-            bbox=_VEIL,
-        )
+            f"{best[-1]:.2f} s", (1.0, best[-1]), (5, 0), xycoords=("axes fraction", "data"),
+            textcoords="offset points", va="center", weight="bold", color=BLUE,
+        )  # fmt: skip
 
 
 def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:

@@ -65,7 +65,7 @@ def _type_size(axes: Axes, lines: list[str]) -> tuple[int, float, float]:
     """Return how many lines fit, the type's size [pt], and a line's share of the height."""
     figure = axes.get_figure(root=True)
     assert figure is not None
-    figure.canvas.draw()  # only now the layout has given the axes their place
+    figure.draw_without_rendering()  # only now the layout has given the axes their place
     box = axes.get_window_extent()
     width_pt, height_pt = (72.0 / figure.dpi * side for side in (box.width, box.height))
     count = min(len(lines), max(int(height_pt / (_LEADING * SMALLEST_PT)) - 1, 1))

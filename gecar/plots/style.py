@@ -88,6 +88,13 @@ def headline(figure: Figure, title: str, detail: str = "") -> None:
         )
 
 
+def settle(figure: Figure) -> None:
+    """Lay a figure out; the layout measures words where the pass before has put them, so it takes two."""
+    with look():
+        for _ in range(2):
+            figure.draw_without_rendering()
+
+
 def picture_kind(path: Path) -> str:
     """Return the kind of picture a name's ending asks for.
 
@@ -110,6 +117,7 @@ def save(figure: Figure, path: Path) -> Path:
         If the ending is none of a picture.
     """
     kind, stream = picture_kind(path), io.BytesIO()
+    settle(figure)
     with look():
         figure.savefig(stream, format=kind, facecolor=PAPER)
     write_whole(path, stream.getvalue())
@@ -118,6 +126,6 @@ def save(figure: Figure, path: Path) -> Path:
 
 def is_whole(figure: Figure) -> bool:
     """Whether nothing reaches over the picture's edge."""
-    figure.canvas.draw()
+    settle(figure)
     drawn, edge = figure.get_tightbbox(), figure.bbox_inches.padded(1.0 / DPI)  # a pixel of antialiasing
     return bool(edge.x0 <= drawn.x0 and edge.y0 <= drawn.y0 and drawn.x1 <= edge.x1 and drawn.y1 <= edge.y1)
