@@ -28,6 +28,8 @@ class Blocks:
         Half-second spans, shape (n,).
     count
         Number of blocks.
+    samples
+        Samples in each, shape (count,).
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -35,7 +37,7 @@ class Blocks:
         self.spans = _group(cells, SPAN_S)
         self._of = _group(cells, BLOCK_S)
         self.count = int(self._of.max()) + 1 if len(self._of) else 0
-        self._samples = np.bincount(self._of)
+        self.samples = np.bincount(self._of, minlength=self.count)
         self._channel = np.zeros(self.count, np.int64)
         self._channel[self._of] = cells.channel
 
@@ -49,11 +51,16 @@ class Blocks:
         colour
             As `colour` returns it; default: that of these residuals.
         """
-        if not len(errors):
-            return 0.0
-        energy = self._energy(errors)
-        expected = (self.colour(errors) if colour is None else colour)[self._channel]
-        return float(np.sum(energy / expected - 1.0))
+        return self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), colour)
+
+    def structure_of_sums(self, sums: Array) -> float:
+        """Return the structure of residuals of which only each block's sum is known, shape (blocks,)."""
+        return self._above(self._energy(sums), None)
+
+    def sums(self, values: Array) -> Array:
+        """Return each block's sum of values, shape (blocks,)."""
+        out: Array = np.bincount(self._of, np.asarray(values, float), self.count)
+        return out
 
     def colour(self, errors: Array) -> Array:
         """Return by how much slow noise exceeds white noise in each channel, shape (channels,); 1 for white.
@@ -62,7 +69,13 @@ class Blocks:
         there. So the typical block tells the noise. Encoders round, they do not linger; the colour sensor mostly sees
         an even floor, whose noise is clipped.
         """
-        energy = self._energy(errors)
+        return self._colour(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))))
+
+    def _above(self, energy: Array, colour: Array | None) -> float:
+        expected = (self._colour(energy) if colour is None else colour)[self._channel]
+        return float(np.sum(energy / expected - 1.0))
+
+    def _colour(self, energy: Array) -> Array:
         out = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
             if channel not in STEADY:
@@ -70,8 +83,8 @@ class Blocks:
                 out[channel] = np.clip(typical, 1.0, MOST_COLOUR)
         return out
 
-    def _energy(self, errors: Array) -> Array:
-        return np.bincount(self._of, np.clip(errors, -CLIP, CLIP)) ** 2 / self._samples
+    def _energy(self, sums: Array) -> Array:
+        return sums**2 / self.samples
 
 
 def _folds(cells: Cells) -> npt.NDArray[np.int32]:

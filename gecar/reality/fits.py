@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from gecar.reality.blocks import Blocks
 from gecar.reality.comparison import Comparison
-from gecar.reality.fitting import Fit, cost, fit, jacobian, weights
+from gecar.reality.fitting import Fit, cost, fit, weights
 from gecar.reality.freedom import Freedom, free
 from gecar.reality.model import Effects, Model
 from gecar.reality.rough_search import rough_search
@@ -17,6 +17,7 @@ from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 NO_SHIFT = np.zeros(1)
+KEPT_FITS = 2  # whose slopes are kept: ten megabytes each
 # How far about a fit is worth a search, in coordinates, where it is not 1.
 ROUGH_SPREAD = {
     "patch_radius": 1.5,
@@ -46,7 +47,7 @@ class Fits:
         comparison.errors(robot.physics)
         self.cells = comparison.cells
         self.blocks = Blocks(self.cells)
-        self._kept_slopes: tuple[Model | None, Array] = (None, np.zeros((0, 0)))
+        self._felt: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
 
     def bare(self) -> Model:
         """Return the robot with nothing fitted."""
@@ -85,27 +86,40 @@ class Fits:
         return Model(model.effects, freedom, found, self.blocks.structure(errors), model.shift)
 
     def slopes(self, model: Model) -> Array:
-        """Return a model's own slopes; the last model's are kept."""
-        if self._kept_slopes[0] is not model:
-            freedom, found = model.freedom, model.fit
-            slopes = jacobian(
-                self.residual(freedom, model.shift), found.z, found.errors, freedom.probes, freedom.bounds[1]
-            )
-            self._kept_slopes = (model, slopes)
-        return self._kept_slopes[1]
+        """Return how residuals feel a model's own parameters, shape (n, parameters)."""
+        felt = [self.felt(model, effect) for effect in model.effects]
+        return np.concatenate([np.zeros((len(model.fit.errors), 0)), *felt], axis=1)
 
-    def extra_slopes(
-        self, model: Model, freedom: Freedom, z: Array, residual: Callable[[Array], Array]
-    ) -> Array:
-        """Return how residuals feel the parameters a freedom has beyond a model's, shape (n, parameters)."""
+    def felt(self, model: Model, effect: str) -> Array:
+        """Return how a model's residuals feel the parameters of an effect, its own or one more, shape (n, parameters).
+
+        A shift taken off the residuals changes no slope, so models with the same fit share theirs; those of the last
+        few fits are kept.
+        """
+        key = (model.effects, model.fit.z.tobytes())
+        kept = self._felt.setdefault(key, {})
+        if effect not in kept:
+            kept[effect] = self._slopes_of(model, effect)
+        while len(self._felt) > KEPT_FITS:
+            self._felt.pop(next(iter(self._felt)))
+        return kept[effect]
+
+    def forget(self) -> None:
+        """Forget the slopes that are kept: the comparison has changed."""
+        self._felt.clear()
+
+    def _slopes_of(self, model: Model, effect: str) -> Array:
+        own = effect in model.effects
+        freedom = free(self.robot, model.effects if own else (*model.effects, effect))
+        z, high, residual = freedom.vector(model.values), freedom.bounds[1], self.residual(freedom)
+        raw = model.fit.errors + model.shift
         columns = []
-        for k in range(len(model.fit.z), len(z)):
-            moved = z.copy()
-            step = (
-                freedom.probes[k] if z[k] + freedom.probes[k] <= freedom.bounds[1][k] else -freedom.probes[k]
-            )
-            moved[k] += step
-            columns.append((residual(moved) - model.fit.errors) / step)
+        for k, c in enumerate(freedom.coordinates):
+            if c.effect.id == effect:
+                moved = z.copy()
+                step = c.probe if z[k] + c.probe <= high[k] else -c.probe
+                moved[k] += step
+                columns.append((residual(moved) - raw) / step)
         return np.stack(columns, axis=1)
 
     def beside(self, model: Model, g: Array) -> Array:

@@ -71,6 +71,8 @@ class Reel(NamedTuple):
 @compiled
 def _held(commands: Array, t: Array, motor: int, at: int, start: float, end: float, cap: float) -> float:
     """Return a motor's mean command between two times; ``at`` is the last row before ``start``, -1 for none."""
+    if at >= 0 and (at + 1 == t.shape[0] or t[at + 1] >= end):  # one row holds throughout: nearly always
+        return min(max(commands[at, motor], -cap), cap) * (end - start)
     total = 0.0
     while start < end:
         stop = end
@@ -277,5 +279,7 @@ def follow(
             step(s, left, right, p, c)
             drift(s, c)
         n += 1
-        i = _see_rows(i, n * dt, stretch, reel, s, p, rows, row_errors, last)
-        j = _see_poses(j, n * dt, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)
+        if i < reel.t.shape[0] and reel.t[i] * stretch <= n * dt + 1e-9:
+            i = _see_rows(i, n * dt, stretch, reel, s, p, rows, row_errors, last)
+        if j < reel.pose_t.shape[0] and (reel.pose_t[j] - late) * stretch <= n * dt + 1e-9:
+            j = _see_poses(j, n * dt, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from gecar.reality.fits import Fits
 from gecar.reality.fitting import costs, weights
-from gecar.reality.freedom import free
 from gecar.reality.model import Model, Step
 
 Array = npt.NDArray[np.float64]
@@ -55,11 +54,7 @@ def null(fits: Fits, catalogue: Sequence[str], model: Model) -> Array:
     for effect in catalogue:
         if effect in model.effects:
             continue
-        freedom = free(fits.robot, (*model.effects, effect))
-        slopes = fits.extra_slopes(
-            model, freedom, freedom.vector(model.values), fits.residual(freedom, model.shift)
-        )
-        g = fits.beside(model, slopes * w[:, None])
+        g = fits.beside(model, fits.felt(model, effect) * w[:, None])
         if g.shape[1]:
             q = np.linalg.qr(g)[0] * (w * errors)[:, None]
             score = np.stack([np.bincount(fits.blocks.spans, column, spans) for column in q.T], axis=1)

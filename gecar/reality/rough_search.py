@@ -14,6 +14,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+PATIENCE = 6  # generations without a gain worth mentioning, after which a search ends
+MENTIONED = 0.1  # of cost: log likelihoods, so this is nothing
+
 
 def rough_search(
     cost: Callable[[Array], float],
@@ -53,6 +56,7 @@ def rough_search(
     mean, sigma, shape = np.zeros(k), 1.0, np.eye(k)
     path, path_sigma = np.zeros(k), np.zeros(k)
     best, best_cost = np.clip(start, *bounds), cost(np.clip(start, *bounds))
+    mentioned, since = best_cost, 0
     for generation in range(generations):
         values, axes = np.linalg.eigh(shape)
         root = axes * np.sqrt(np.maximum(values, 1e-12))
@@ -62,6 +66,11 @@ def rough_search(
         order = np.argsort(found)
         if found[order[0]] < best_cost:
             best, best_cost = places[order[0]], float(found[order[0]])
+        since += 1
+        if best_cost < mentioned - MENTIONED:
+            mentioned, since = best_cost, 0
+        if since >= PATIENCE:
+            break
         move = weight @ steps[order[:parents]]
         mean = mean + sigma * move
         path_sigma = (1 - c_sigma) * path_sigma + math.sqrt(c_sigma * (2 - c_sigma) * mass) * (

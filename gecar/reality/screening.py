@@ -92,8 +92,7 @@ def _screen(fits: Fits, recordings: Sequence[Recording], model: Model, effect: s
     found = np.array([cost(residual(z)) for z in places])
     order = np.argsort(found)
     kept = _apart([places[k] for k in order], RESTARTS)
-    here = freedom.vector(model.values)
-    slopes = fits.extra_slopes(model, freedom, here, residual)
+    slopes = fits.felt(model, effect)
     linear = _linear_gain(fits, model, slopes)
     promise = max(linear, model.cost - float(found[order[0]]))
     return _Trial((*model.effects, effect), freedom, Fit(kept[0], model.fit.errors, slopes, float(found[order[0]])),

@@ -78,6 +78,7 @@ class Selection(Fits):
             return False
         self.clocked = True
         self.comparison.set_offsets(offsets)
+        self.forget()
         self.catalogue = tuple(e for e in self.catalogue if e != "pose_delay")
         self.nothing = self.bare()
         return True

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from gecar.reality.fits import NO_SHIFT, Fits
 from gecar.reality.fitting import weights
-from gecar.reality.freedom import free
 from gecar.reality.model import Model
+from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
@@ -32,13 +32,12 @@ def shifts(fits: Fits, catalogue: Sequence[str], model: Model) -> dict[str, Arra
     owner = np.concatenate([[e] * g.shape[1] for e, g in columns.items()])
     g = np.concatenate(list(columns.values()), axis=1)
     normal, pull = g.T @ (w[:, None] * g), g.T @ (w * raw)
-    out = {}
-    for effect in (*catalogue, ""):
+    sizes = np.zeros((g.shape[1], len(catalogue) + 1))
+    for k, effect in enumerate((*catalogue, "")):
         rest = np.flatnonzero((owner != effect) & ~np.isin(owner, model.effects))
         ridge = np.eye(len(rest)) / SUBTLE**2
-        sizes = np.linalg.solve(normal[np.ix_(rest, rest)] + ridge, pull[rest])
-        out[effect] = g[:, rest] @ np.clip(sizes, -1.0, 1.0)
-    return out
+        sizes[rest, k] = np.clip(np.linalg.solve(normal[np.ix_(rest, rest)] + ridge, pull[rest]), -1.0, 1.0)
+    return dict(zip((*catalogue, ""), (g @ sizes).T, strict=True))
 
 
 def rid_of_subtle(fits: Fits, catalogue: Sequence[str], model: Model) -> Model:
@@ -50,16 +49,7 @@ def rid_of_subtle(fits: Fits, catalogue: Sequence[str], model: Model) -> Model:
 def subtle_slopes(fits: Fits, catalogue: Sequence[str], model: Model) -> list[Array]:
     """Return how residuals feel every size worth a name, a column each; what vanishes is left out."""
     out = []
-    raw = model.fit.errors + model.shift
     for effect in catalogue:
-        freedom = free(fits.robot, (*(e for e in model.effects if e != effect), effect))
-        z = freedom.vector(model.values)
-        columns = []
-        for k, c in enumerate(freedom.coordinates):
-            if c.effect.id == effect and c.parameter.worthwhile > 0.0:
-                moved = z.copy()
-                step = 0.5 if moved[k] + 0.5 <= freedom.bounds[1][k] else -0.5
-                moved[k] += step
-                columns.append((fits.residual(freedom)(moved) - raw) / step)
-        out.append(np.stack(columns, axis=1) if columns else np.zeros((len(raw), 0)))
+        named = [p.worthwhile > 0.0 for p in BY_ID[effect].parameters]
+        out.append(fits.felt(model, effect)[:, named])
     return out

@@ -102,10 +102,13 @@ class Judgement:
 
     @property
     def gap_closed(self) -> float | None:
-        """Share of the gap to the floor that is closed; None where there is no gap to speak of."""
-        gap = self.before - self.floor
-        seen = any(m.before > VISIBLE * m.floor for m in self.channels.values())
-        return (self.before - self.after) / gap if seen and gap > 0.0 else None
+        """Share of the gap to the floor that is closed; None where there is no gap to speak of.
+
+        Summed over the channels that have a gap, before or after: one that shows noise alone has nothing to close.
+        """
+        seen = [m for m in self.channels.values() if max(m.before, m.after) > VISIBLE * m.floor]
+        gap = sum(m.before - m.floor for m in seen)
+        return sum(m.before - m.after for m in seen) / gap if gap > 0.0 else None
 
 
 @dataclass(frozen=True)

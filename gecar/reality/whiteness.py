@@ -21,10 +21,12 @@ def whiteness(selection: Selection, model: Model) -> tuple[bool, float]:
     if not selection.blocks.count:
         return True, 1.0
     rng = np.random.default_rng(selection.blocks.count)
+    blocks = selection.blocks
     slopes = np.concatenate(subtle_slopes(selection, selection.catalogue, model), axis=1)
+    felt = np.stack([blocks.sums(column) for column in slopes.T], axis=1)
     drawn = []
     for _ in range(DRAWS):
-        errors = rng.standard_normal(len(slopes)) + slopes @ rng.uniform(-SUBTLE, SUBTLE, slopes.shape[1])
-        drawn.append(selection.blocks.structure(errors))
+        noise = np.sqrt(blocks.samples) * rng.standard_normal(blocks.count)  # a block's sum of white noise
+        drawn.append(blocks.structure_of_sums(noise + felt @ rng.uniform(-SUBTLE, SUBTLE, felt.shape[1])))
     p = float((1 + np.sum(np.array(drawn) >= model.structure)) / (1 + DRAWS))
     return p > 0.05, p
