@@ -360,14 +360,14 @@ def test_a_forged_checkpoint_is_refused(body: bytes) -> None:
     from gecar.results.checkpoint import _checksum
 
     for text in (body, b'{"configuration": "mine", "codons": 5, "n_arrivals": 0, "rows": {}}\n' + body):
-        raw = b"gecar checkpoint 1 " + _checksum(text) + b"\n" + text
+        raw = b"gecar checkpoint 2 " + _checksum(text) + b"\n" + text
         with pytest.raises(InputError):
             unpack(raw, "mine", HERE)
 
 
 def test_a_checkpoint_of_a_later_version_is_refused_as_such() -> None:
-    with pytest.raises(InputError, match="found a checkpoint of version '2', expected version 1"):
-        unpack(WHOLE.replace(b"checkpoint 1", b"checkpoint 2", 1), "mine", HERE)
+    with pytest.raises(InputError, match="found a checkpoint of version '3', expected version 2"):
+        unpack(WHOLE.replace(b"checkpoint 2", b"checkpoint 3", 1), "mine", HERE)
 
 
 def test_a_configuration_written_reads_back_equal() -> None:

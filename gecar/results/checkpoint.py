@@ -1,13 +1,14 @@
 """The checkpoint: an evolution's state as plain bytes, with a checksum, and nothing that could be executed.
 
-A line ``gecar checkpoint 1 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
-and the arrays one after the other, little-endian, in the order of `_layout`.
+A line ``gecar checkpoint 2 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
+and the arrays one after the other, little-endian, in the order of `_layout`; the lineage is packed by zlib.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,12 @@ import numpy as np
 from gecar.errors import InputError, expected
 from gecar.search.fitness import score_type
 from gecar.search.history import HISTORY
+from gecar.search.lineage import MAX_BYTES
 from gecar.search.phenotypes import DIGEST_BYTES
 from gecar.search.state import State
 
 _MAGIC = b"gecar checkpoint "
-_VERSION = b"1"
+_VERSION = b"2"
 
 
 def pack(state: State, configuration: str) -> bytes:
@@ -35,6 +37,7 @@ def pack(state: State, configuration: str) -> bytes:
     """
     codons, n_arrivals = len(state.best_genome), state.scores.dtype["arrival_s"].shape[0]
     arrays = {name: getattr(state, name) for name in _layout(codons, n_arrivals)}
+    arrays["lineage"] = np.frombuffer(zlib.compress(state.lineage.tobytes(), level=1), np.uint8)
     header = {
         "configuration": configuration,
         "seed": state.seed,
@@ -75,7 +78,7 @@ def unpack(raw: bytes, configuration: str, where: Path) -> State:
         raise expected(where, "a checkpoint cut short or changed (its checksum differs)", "a whole one")
     try:
         return _read(body, configuration, where)
-    except (ValueError, KeyError, TypeError, OverflowError, MemoryError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, MemoryError, zlib.error) as error:
         if isinstance(error, InputError):
             raise
         raise expected(where, f"a header that does not fit ({error})", "a whole checkpoint") from None
@@ -95,6 +98,9 @@ def _read(body: bytes, configuration: str, where: Path) -> State:
         flat = np.frombuffer(rest[used : used + size], kind.base)
         arrays[name] = flat.reshape(header["rows"][name], *kind.shape).copy()
         used += size
+    # Bounded: a few forged bytes could unpack to more than there is memory.
+    unpacked = zlib.decompressobj().decompress(arrays["lineage"].tobytes(), MAX_BYTES)
+    arrays["lineage"] = np.frombuffer(unpacked, np.uint8)
     return State(seed=header["seed"], best_generation=header["best_generation"], **arrays)
 
 
@@ -109,6 +115,7 @@ def _layout(codons: int, n_arrivals: int) -> dict[str, np.dtype[Any]]:
         "history": HISTORY,
         "digests": np.dtype(("u1", (DIGEST_BYTES,))),
         "cached": score,
+        "lineage": np.dtype("u1"),
     }
 
 

@@ -12,6 +12,7 @@ from gecar.language.mapping import Mapper
 from gecar.search.crossover import OnePoint, Subtree
 from gecar.search.fitness import Scores, merit
 from gecar.search.initialisation import initialise
+from gecar.search.lineage import CREEP, CROSSOVER, MUTATION, differs
 from gecar.search.mutation import Creep, Flip, Renew
 from gecar.search.phenotypes import Phenotype, Phenotypes
 from gecar.search.randomness import Streams, spawn
@@ -36,12 +37,19 @@ class Bred:
         Their programs; None where a genome maps to none.
     parents
         Indices in the population before (population, 2): whose genome it was, and whom it was paired with; an
-        elite's are twice itself, the first population's are -1.
+        elite's are twice itself, those of the first population and of ``renew`` are -1.
+    changed
+        Which operators changed what the genome derives (population,), as bits; see `gecar.search.lineage`.
     """
 
     genomes: Bytes
     phenotypes: list[Phenotype | None]
     parents: Int32s
+    changed: Bytes
+
+
+Drawn = tuple[Bytes, Int32s, Bytes]
+"""Genomes, parents and changes, as in `Bred`."""
 
 
 class Breeder:
@@ -66,9 +74,10 @@ class Breeder:
         """Return the first population."""
         settings = self.settings
 
-        def draw(attempt: int) -> tuple[Bytes, Int32s]:
-            streams = spawn(self.seed, 0, attempt, settings.population)
-            return initialise(settings, self.mapper, streams), np.full((settings.population, 2), -1, np.int32)
+        def draw(attempt: int) -> Drawn:
+            n = settings.population
+            genomes = initialise(settings, self.mapper, spawn(self.seed, 0, attempt, n))
+            return genomes, np.full((n, 2), -1, np.int32), np.zeros(n, np.uint8)
 
         return self._without_duplicates(draw, 0, known)
 
@@ -88,20 +97,31 @@ class Breeder:
         merits = merit(scores, self.settings.checkpoint_credit)
         elites = np.argsort(merits, kind="stable")[:n_elites].astype(np.int32)
 
-        def draw(attempt: int) -> tuple[Bytes, Int32s]:
+        def draw(attempt: int) -> Drawn:
             n = self.settings.population - n_elites
             streams = spawn(self.seed, generation, attempt, n + n % 2)
             chosen = self._select(merits, scores, streams)
-            children = genomes[chosen]
-            for operator in self._operators:
-                children = operator(children, self.mapper, streams)
+            children, changed = self._vary(genomes[chosen], streams)
             pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
+            if self.settings.mutation == "renew":
+                pairs[:] = -1
             return (
                 np.concatenate([genomes[elites], children[:n]]),
                 np.concatenate([np.column_stack([elites, elites]), pairs[:n]]),
+                np.concatenate([np.zeros(n_elites, np.uint8), changed[:n]]),
             )
 
         return self._without_duplicates(draw, n_elites, known)
+
+    def _vary(self, children: Bytes, streams: Streams) -> tuple[Bytes, Bytes]:
+        """Return the children as the operators leave them, and which operators changed what they derive."""
+        changed, before = np.zeros(len(children), np.uint8), self.mapper.map(children)
+        for bit, operator in self._operators:
+            children = operator(children, self.mapper, streams)
+            after = self.mapper.map(children)
+            changed += np.uint8(bit) * differs(before, after)
+            before = after
+        return children, changed
 
     def _select(self, merits: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
         if self.settings.selection == "tournament":
@@ -110,11 +130,11 @@ class Breeder:
         return lexicase(cases, deviations(cases), streams)
 
     def _without_duplicates(
-        self, draw: Callable[[int], tuple[Bytes, Int32s]], n_elites: int, known: Callable[[bytes], bool]
+        self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
     ) -> Bred:
         """Draw individuals, and draw those again that are duplicates, as often as the settings say."""
         self._phenotypes.turn()
-        genomes, parents = draw(0)
+        genomes, parents, changed = draw(0)
         phenotypes = self._phenotypes.read(genomes)
         attempts = 0 if self.settings.duplicates == "kept" else self.settings.attempts
         simulated = known if self.settings.duplicates == "run" else _never
@@ -122,25 +142,27 @@ class Breeder:
             again = _duplicates(phenotypes, n_elites, simulated)
             if not again:
                 break
-            others, their_parents = draw(attempt)
-            genomes[again], parents[again] = others[again], their_parents[again]
+            for kept, drawn in zip((genomes, parents, changed), draw(attempt), strict=True):
+                kept[again] = drawn[again]  # type: ignore[index]
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
-        return Bred(genomes, phenotypes, parents)
+        return Bred(genomes, phenotypes, parents, changed)
 
 
-def _operators(settings: Settings) -> list[Operator]:
-    """Return crossover and mutation as the settings have them."""
+def _operators(settings: Settings) -> list[tuple[int, Operator]]:
+    """Return crossover and mutation as the settings have them, each with its bit in a lineage."""
     if settings.mutation == "renew":
-        return [Renew(settings)]
+        return [(MUTATION, Renew(settings))]
     crossover: dict[str, Operator] = {
         "one_point": OnePoint(settings.crossover_rate),
         "one_point_used": OnePoint(settings.crossover_rate, within_used=True),
+        "variable_one_point": VariableOnePoint(settings.crossover_rate),
         "subtree": Subtree(settings.crossover_rate),
     }
-    flip = Flip(settings.mutation_rate, within_used=settings.mutation == "used_codon")
-    creep = [Creep(settings.creep_rate)] if settings.creep_rate else []
-    return [crossover[settings.crossover], flip, *creep]
+    rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
+    flip = Flip(rate, within_used=settings.mutation != "codon")
+    creep: list[tuple[int, Operator]] = [(CREEP, Creep(settings.creep_rate))] if settings.creep_rate else []
+    return [(CROSSOVER, crossover[settings.crossover]), (MUTATION, flip), *creep]
 
 
 def _duplicates(

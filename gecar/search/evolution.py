@@ -21,8 +21,9 @@ from gecar.language.mapping import Mapper
 from gecar.language.program import Program
 from gecar.search.breeding import Bred, Breeder
 from gecar.search.cache import ScoreCache
-from gecar.search.fitness import Scores, as_scores, invalid_scores
+from gecar.search.fitness import Scores, as_scores, invalid_scores, merit
 from gecar.search.history import HISTORY, Generation, Totals, summary
+from gecar.search.lineage import Ledger
 from gecar.search.settings import Settings
 from gecar.search.state import Best, Candidate, State
 
@@ -63,6 +64,7 @@ class Evolution:
         self._breeder = Breeder(settings, mapper, seed)
         self._bred: Bred | None = None
         self._parents = np.zeros((0, 2), np.int32)
+        self._ledger = Ledger()
         self._asked: dict[bytes, list[int]] = {}
         self._began: float | None = None
         self._earlier_s = 0.0
@@ -73,6 +75,7 @@ class Evolution:
         evolution = cls(settings, mapper, state.seed, n_arrivals)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
         evolution.genomes, evolution.scores = state.genomes, state.scores
+        evolution._ledger = Ledger(state.lineage, going_on=True)
         evolution._earlier_s = evolution.history[-1].wall_s
         evolution._cache.add([row.tobytes() for row in state.digests], state.cached)
         program = mapper.map(state.best_genome[None]).program(0)
@@ -101,6 +104,7 @@ class Evolution:
             history,
             digests,
             cached,
+            self._ledger.dump(),
         )
 
     @property
@@ -188,6 +192,8 @@ class Evolution:
         self._cache.add(list(self._asked), told)
         self.genomes, self.scores, self._bred = bred.genomes, scores, None
         self._record(bred, told)
+        keys = [b"" if phenotype is None else phenotype.key for phenotype in bred.phenotypes]
+        self._ledger.add(bred.parents, bred.changed, merit(scores, checkpoint_credit=True), keys)
         return self.history[-1]
 
     def _breed(self) -> Bred:

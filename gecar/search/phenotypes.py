@@ -17,9 +17,10 @@ DIGEST_BYTES = 16
 
 @dataclass(frozen=True)
 class Phenotype:
-    """A program, known by what it does."""
+    """A program, known by what it does, and the codons that derive it, as few and as small as do."""
 
     program: Program
+    key: bytes
 
     @cached_property
     def digest(self) -> bytes:
@@ -59,4 +60,4 @@ class Phenotypes:
 
 def _read(mapped: Mapped, i: int) -> Phenotype | None:
     program = mapped.program(i)
-    return None if program is None else Phenotype(program)
+    return None if program is None else Phenotype(program, mapped.key(i))

@@ -69,6 +69,8 @@ class State:
         Dtype `gecar.search.history.HISTORY`, shape (generations so far,).
     digests, cached
         The score cache, oldest first (n, 16), (n,).
+    lineage
+        What a `gecar.search.lineage.Ledger` kept (bytes,).
     """
 
     seed: int
@@ -80,3 +82,4 @@ class State:
     history: npt.NDArray[np.void]
     digests: Bytes
     cached: Scores
+    lineage: Bytes
