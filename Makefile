@@ -12,7 +12,7 @@ PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 py
 	$(if $(shell $(name) -c '$(NEW_ENOUGH)' 2>/dev/null),$(name))))
 
 .DEFAULT_GOAL := help
-.PHONY: help env evolve test check format bench clean
+.PHONY: help env evolve test check format bench concealed clean
 
 help:  ## Show this list
 	@echo "gecar: evolve programs for a line-following robot. Try: make evolve"
@@ -40,6 +40,9 @@ format: $(VENV)/.check  ## Put the sources in the format that check wants
 
 bench: $(VENV)/.runtime  ## Measure how fast gecar is, and print it as a table
 	$(PY) -m benchmarks $(ARGS)
+
+concealed: $(VENV)/.test  ## Examine gecar discover on concealed robots (hours; resumes)
+	$(PY) -m benchmarks.concealed exam --out runs/concealed --report benchmarks/concealed/RESULTS.md $(ARGS)
 
 clean:  ## Remove .venv and what tools leave behind; runs/ stays
 	rm -rf $(VENV) tests/node/node_modules build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

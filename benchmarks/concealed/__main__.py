@@ -1,14 +1,20 @@
-"""The command line: ``python -m benchmarks.concealed draw | plan | run | score | drive | practice``."""
+"""The command line: ``python -m benchmarks.concealed draw | plan | exam | run | score | drive | practice``."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.concealed.runner import DISCOVER, run_all
+
+if TYPE_CHECKING:
+    from benchmarks.concealed.plan import Counts
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -46,11 +52,20 @@ def _parser() -> argparse.ArgumentParser:
 
     plan = commands.add_parser("plan", help="draw and seal a whole examination; resumes")
     plan.add_argument("--seed", type=int, required=True)
-    plan.add_argument("--none", type=int, default=100, help="cases that conceal nothing")
-    plan.add_argument("--each", type=int, default=5, help="cases of every effect")
-    plan.add_argument("--double", type=int, default=40, help="cases that conceal two effects")
-    plan.add_argument("--outside-each", type=int, default=3, help="cases of every kind outside the catalogue")
+    _ask_counts(plan)
     plan.set_defaults(command=_plan)
+
+    exam = commands.add_parser("exam", help="all of it: draw, seal, run, score, write the tables; resumes")
+    exam.add_argument("--seed", type=int, help="default: the folder's, or a fresh one")
+    _ask_counts(exam)
+    exam.add_argument("--compare", type=int, default=100, metavar="N", help="comparators see N cases (100)")
+    exam.add_argument("--tools", help="with commas between; default: gecar and all comparators")
+    exam.add_argument(
+        "--minutes", type=float, default=math.inf, help="begin no case after so long, and report"
+    )
+    exam.add_argument("--timeout", type=float, default=900.0, help="seconds a case may take")
+    exam.add_argument("--report", type=Path, help="Markdown file; default: RESULTS.md in --out")
+    exam.set_defaults(command=_exam)
 
     run = commands.add_parser("run", help="run a tool on every open case; resumes")
     run.add_argument("--verdicts", type=Path, required=True)
@@ -64,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
     score.set_defaults(command=_score)
 
-    for command in (draw, plan, run, score):
+    for command in (draw, plan, exam, run, score):
         command.add_argument(
             "--out", type=Path, default=Path("runs/concealed"), help="holds cases/ and sealed/"
         )
@@ -85,6 +100,18 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _ask_counts(parser: argparse.ArgumentParser) -> None:
+    """Ask how many cases of each kind; what is not said is the whole examination's."""
+    words = {
+        "none": "conceal nothing (100)",
+        "single": "conceal one effect (5 of each)",
+        "double": "conceal two effects (40)",
+        "outside": "conceal what no effect of the catalogue is (3 of each kind)",
+    }
+    for kind, what in words.items():
+        parser.add_argument(f"--{kind}", type=int, metavar="N", help=f"cases that {what}")
+
+
 # What needs MuJoCo, or matplotlib, is imported by the command that needs it: `run` and `--help` do without.
 
 
@@ -100,9 +127,40 @@ def _draw(chosen: argparse.Namespace) -> int:
 def _plan(chosen: argparse.Namespace) -> int:
     from benchmarks.concealed.plan import Counts, draw_all, plan  # noqa: PLC0415
 
-    counts = Counts(chosen.none, chosen.each, chosen.double, chosen.outside_each)
-    print(draw_all(plan(chosen.seed, counts), chosen.out, chosen.workers))
+    print(draw_all(plan(chosen.seed, _counts(chosen, Counts())), chosen.out, chosen.workers))
     return 0
+
+
+def _counts(chosen: argparse.Namespace, whole: Counts) -> Counts:
+    """Take the numbers asked for, and the whole examination's for the rest."""
+    asked = {kind: getattr(chosen, kind) for kind in asdict(whole)}
+    return replace(whole, **{kind: count for kind, count in asked.items() if count is not None})
+
+
+def _exam(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.exam import COMPARATORS, GECAR, agreed, examine  # noqa: PLC0415
+    from benchmarks.concealed.plan import Counts  # noqa: PLC0415
+    from benchmarks.concealed.results import write_results  # noqa: PLC0415
+
+    tools = chosen.tools.split(",") if chosen.tools else [GECAR, *COMPARATORS]
+    if strangers := set(tools) - {GECAR, *COMPARATORS}:
+        message = (
+            f"--tools: found {', '.join(strangers)}, expected some of: {', '.join((GECAR, *COMPARATORS))}"
+        )
+        raise ValueError(message)
+    terms = agreed(chosen.out, chosen.seed, _counts(chosen, Counts()))
+    stopped = 0
+    try:
+        examine(chosen.out, terms, tools, chosen.compare, chosen.workers, chosen.timeout, chosen.minutes)
+    except KeyboardInterrupt:
+        print("\nstopped; the same command goes on from here", file=sys.stderr)
+        stopped = 130
+    if not (chosen.out / "manifest.sha256").exists():
+        return stopped
+    path = chosen.report or chosen.out / "RESULTS.md"
+    write_results(chosen.out, terms, path, chosen.workers)
+    print(f"written to {path}")
+    return stopped
 
 
 def _run(chosen: argparse.Namespace) -> int:

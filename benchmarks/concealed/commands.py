@@ -80,9 +80,14 @@ def line_follower(kind: str, rng: np.random.Generator) -> tuple[Pose, Controller
 
     def smooth(_: float, reading: int) -> tuple[int, int]:
         turn = gain * (reading - 50) * (1.0 if reading > 50 else 1.8)  # or it runs across the line in corners
-        return round(base - turn), round(base + turn)
+        return _duty(base - turn), _duty(base + turn)
 
     return start, smooth
+
+
+def _duty(wanted: float) -> int:
+    """Whole percents, and no more than there is: what a brick would log."""
+    return round(min(max(wanted, -100.0), 100.0))
 
 
 def _holds(rng: np.random.Generator) -> Array:

@@ -18,12 +18,12 @@ from benchmarks.concealed.outside import OUTSIDE
 
 @dataclass(frozen=True)
 class Counts:
-    """How many cases of each kind."""
+    """How many cases of each kind; single and outside ones are spread evenly over what there is to conceal."""
 
     none: int = 100
-    each: int = 5  # of every effect of the catalogue
+    single: int = 5 * len(EFFECTS)
     double: int = 40
-    outside_each: int = 3  # of every kind outside the catalogue
+    outside: int = 3 * len(OUTSIDE)
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ def plan(seed: int, counts: Counts) -> list[Planned]:
     """
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0)))
     contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
-    contents += [("single", (effect,)) for effect in EFFECTS for _ in range(counts.each)]
+    contents += [("single", (effect,)) for effect in _spread(EFFECTS, counts.single, rng)]
     contents += [("double", _pair(rng)) for _ in range(counts.double)]
-    contents += [("outside", (kind,)) for kind in OUTSIDE for _ in range(counts.outside_each)]
+    contents += [("outside", (kind,)) for kind in _spread(OUTSIDE, counts.outside, rng)]
     order = rng.permutation(len(contents))
     return [
         Planned(f"c{place + 1:03d}", contents[index][0], contents[index][1], (seed, 1 + int(index)))
@@ -97,6 +97,12 @@ def read_label(out: Path, name: str) -> dict[str, object]:
     """Open one sealed label; for the scorer only."""
     label: dict[str, object] = json.loads((out / "sealed" / name / "label.json").read_text(encoding="utf-8"))
     return label
+
+
+def _spread(names: Iterable[str], count: int, rng: np.random.Generator) -> list[str]:
+    """Take names in a drawn order, round and round."""
+    order = rng.permutation(list(names)).tolist()
+    return [order[place % len(order)] for place in range(count)]
 
 
 def _pair(rng: np.random.Generator) -> tuple[str, ...]:

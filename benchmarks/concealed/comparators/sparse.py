@@ -1,0 +1,181 @@
+"""Sparse regression on differentiated residuals (SINDy: Brunton, Proctor, Kutz, PNAS 113(15), 2016).
+
+Speeds and accelerations are taken from the recordings by differentiation, and what the nominal robot's equations of
+motion leave over is regressed, by sequentially thresholded least squares, on a library of terms. Each term is the law
+of an effect in closed form, counted in sizes worth a name; the threshold is 1. Effects without such a law, and those
+that slip or play, have no term: it can not name them, and it can not abstain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import savgol_filter
+
+from gecar.reality.comparison import Strip
+from gecar.reality.discovery import MEMORY_S
+from gecar.reality.freedom import Coordinate, free
+from gecar.reality.holdout import judge, split
+from gecar.reality.known_robot import known_robot
+from gecar.reality.noise import estimate_noise
+from gecar.reality.recording import Case, Recording
+from gecar.reality.uncertainty import NORMAL_95
+from gecar.reality.verdict import Interval, Judgement
+from gecar.world.course import load_course
+from gecar.world.effects import CATALOGUE
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Terms = dict[str, Array]  # by the parameter's field: what one SI unit of it adds to the left side
+Equation = tuple[
+    Array, Terms, float
+]  # what is left over, what it is regressed on, and the unit it is counted in
+
+ROW_S = 0.01
+WINDOW = 15  # rows a derivative is taken over
+ROUNDS = 10
+RESTING = 0.3  # rad/s: where friction has no sign
+GRAVITY = 9.81
+# What noise leaves of each equation on the practice case that conceals nothing, about.
+TORQUE_NM, SPEED_M_S, TURN_RAD_S, READING_PCT = 0.02, 0.01, 0.1, 3.0
+
+
+def sparse_regression(case: Case, holdout: Sequence[str]) -> dict[str, Any]:
+    """Return a verdict in the form of ``verdict.json``."""
+    parts = split(case, holdout)
+    robot = known_robot(parts.fitted[0])
+    noise = estimate_noise(parts.fitted, robot.physics, MEMORY_S)
+    course = load_course(parts.fitted[0].setup.course)
+    known = {c.parameter.field: c for e in CATALOGUE for c in free(robot, [e.id]).coordinates}
+    strips = [Strip(r, noise, MEMORY_S, course) for r in (*parts.fitted, *parts.held)]
+    for strip in strips:
+        strip.set_path(robot.physics)
+    looked = [_sight(strip, robot) for strip in strips[: len(parts.fitted)]]
+    equations = [e for r in parts.fitted for e in (*_torques(r, robot), *_rolling(r, robot))] + looked
+    effects: dict[str, dict[str, Interval]] = {}
+    for field, (size, sd) in _thresholded([_counted(*e, known) for e in equations if len(e[0])]).items():
+        effects.setdefault(known[field].effect.id, {})[known[field].parameter.label] = _interval(
+            known[field], size, sd
+        )
+    after = robot.with_effects({e: {label: i.value for label, i in p.items()} for e, p in effects.items()})
+    judged = Judgement((), False, judge(parts.held, strips[len(parts.fitted) :], noise, robot, after))
+    return {
+        "verdict": "missing" if effects else "nothing",
+        "effects": [
+            {"id": e, "or": [], "parameters": {k: vars(i) for k, i in p.items()}} for e, p in effects.items()
+        ],
+        "located": [],
+        "holdout": {"before": judged.before, "after": judged.after, "gap_closed": judged.gap_closed},
+    }
+
+
+def _interval(c: Coordinate, size: float, sd: float) -> Interval:
+    low, high = sorted(c.value(size + side * NORMAL_95 * sd) for side in (-1.0, 1.0))
+    return Interval(c.value(size), low, high, c.parameter.unit)
+
+
+def _counted(left: Array, terms: Terms, unit: float, known: Mapping[str, Coordinate]) -> tuple[Array, Terms]:
+    """Count an equation in a unit of its own, so that all weigh alike, and its terms in sizes worth a name."""
+    return left / unit, {f: g * known[f].step * known[f].parameter.si / unit for f, g in terms.items()}
+
+
+def _thresholded(equations: Sequence[tuple[Array, Terms]]) -> dict[str, tuple[float, float]]:
+    """Return size and standard deviation, in sizes worth a name, of the terms that stay above 1."""
+    names = sorted({name for _, terms in equations for name in terms})
+    left = np.concatenate([residual for residual, _ in equations]) if equations else np.zeros(0)
+    library = np.concatenate(
+        [np.stack([terms.get(n, np.zeros(len(r))) for n in names], axis=1) for r, terms in equations]
+    ) if equations else np.zeros((0, 0))  # fmt: skip
+    kept = list(range(len(names)))
+    sizes = np.zeros(0)
+    for _ in range(ROUNDS):
+        sizes = np.linalg.lstsq(library[:, kept], left, rcond=None)[0]
+        large = [k for k, size in zip(kept, sizes, strict=True) if abs(size) >= 1.0]
+        if large == kept:
+            break
+        kept = large
+    if not kept:
+        return {}
+    chosen = library[:, kept]
+    variance = float(np.mean((left - chosen @ sizes) ** 2))
+    spread = np.sqrt(variance * np.diag(np.linalg.pinv(chosen.T @ chosen)))
+    return {names[k]: (float(sizes[i]), float(spread[i])) for i, k in enumerate(kept)}
+
+
+def _torques(recording: Recording, robot: Robot) -> list[Equation]:
+    """Return what torque is left over at each shaft [N m] by the nominal motor, robot and friction.
+
+    M dw/dt = K (u V - Ke w) - c sign(w), K = Kt / R; M couples both shafts through the robot's mass and yaw inertia.
+    """
+    p, t = robot.physics[0], _even(recording.t_s, recording.t_s)
+    angles = np.column_stack([recording.left_angle_rad, recording.right_angle_rad])
+    if np.isnan(angles).all():
+        return []
+    angles = np.column_stack([_even(recording.t_s, a) for a in angles.T])
+    duty = np.column_stack([np.interp(t, recording.t_s, u) for u in recording.commands.T])
+    duty = np.clip(duty, -p["duty_cap"], p["duty_cap"])
+    w, dw, du = _slope(angles), _slope(angles, 2), _slope(duty)
+    ahead = p["mass"] * p["wheel_radius"] ** 2 / 4.0
+    aside = p["yaw_inertia"] * p["wheel_radius"] ** 2 / p["track_width"] ** 2
+    own, other = p["inertia"] + ahead + aside, ahead - aside
+    gain, sign = p["torque_constant"] / p["resistance"], np.sign(w) * (np.abs(w) > RESTING)
+    drive = gain * (duty * p["voltage"] - p["back_emf_constant"] * w)
+    left = own * dw + other * dw[:, ::-1] - drive + p["coulomb_friction"] * sign
+    drawn = np.sum(np.abs(duty * drive) / p["torque_constant"], axis=1)
+    full = gain * p["voltage"]
+    heading = _even(recording.t_s, recording.heading_rad)
+    pull = 0.5 * p["mass"] * GRAVITY * p["wheel_radius"]
+    columns = {
+        "coulomb_friction": -sign, "viscous_friction": -w, "static_friction": -sign * np.exp(-(w**2)),
+        "friction_ratio": -p["coulomb_friction"] * np.abs(sign), "direction_gain": full * np.abs(duty),
+        "dead_band": -full * np.sign(duty), "inertia_scale": -p["inertia"] * dw, "actuation_delay": -full * du,
+        "gain_difference": full * duty * np.array([-0.5, 0.5]), "supply_scale": full * duty,
+        "battery_resistance": -gain * duty * drawn[:, None], "battery_drain": -gain * duty * t[:, None],
+        "tilt_x": np.tile(pull * np.cos(heading)[:, None], 2), "tilt_y": np.tile(pull * np.sin(heading)[:, None], 2),
+    }  # fmt: skip
+    moving = (np.abs(w) > RESTING).ravel()
+    return [(left.ravel()[moving], {f: g.ravel()[moving] for f, g in columns.items()}, TORQUE_NM)]
+
+
+def _rolling(recording: Recording, robot: Robot) -> list[Equation]:
+    """Return what speed ahead [m/s] and turning rate [rad/s] are left over by wheels that roll."""
+    p, at = robot.physics[0], recording.t_s
+    x, y, heading = (_even(at, c) for c in (recording.x_m, recording.y_m, recording.heading_rad))
+    angles = np.column_stack([_even(at, a) for a in (recording.left_angle_rad, recording.right_angle_rad)])
+    if not (np.any(x) and np.any(angles)):
+        return []
+    v = _slope(x) * np.cos(heading) + _slope(y) * np.sin(heading)
+    wheels, turn = _slope(angles) * p["wheel_radius"], _slope(heading)
+    ahead, turned = wheels.mean(axis=1), (wheels[:, 1] - wheels[:, 0]) / p["track_width"]
+    straight = {"radius_scale": ahead, "pose_delay": -_slope(ahead)}
+    turning = {
+        "radius_scale": turned, "radius_difference": ahead / p["track_width"], "track_scale": -turned,
+        "pose_delay": -_slope(turned),
+    }  # fmt: skip
+    return [(v - ahead, straight, SPEED_M_S), (turn - turned, turning, TURN_RAD_S)]
+
+
+def _sight(strip: Strip, robot: Robot) -> Equation:
+    """Return what reading is left over [%] along the measured path."""
+    told = strip.readings(robot.physics)
+    seen = ~np.isnan(told) & ~np.isnan(strip.recording.reflection_pct)
+    if not seen.any():
+        return np.zeros(0), {}, 1.0
+    columns = {"sensor_gain": told, "sensor_offset": np.ones(len(told)), "sensor_delay": -_slope(told)}
+    left = strip.recording.reflection_pct - told
+    return left[seen], {f: g[seen] for f, g in columns.items()}, READING_PCT
+
+
+def _even(t: Array, values: Array) -> Array:
+    """Return values at even times 10 ms apart, gaps bridged; 0 where there are none."""
+    seen = ~np.isnan(values)
+    grid = np.arange(t[0], t[-1], ROW_S)
+    return np.interp(grid, t[seen], values[seen]) if seen.any() else np.zeros(len(grid))
+
+
+def _slope(values: Array, order: int = 1) -> Array:
+    """Return a derivative of a local parabola (Savitzky and Golay 1964)."""
+    return np.asarray(savgol_filter(values, WINDOW, 2, deriv=order, delta=ROW_S, axis=0))
