@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import ast
+import hashlib
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip(
-    "mujoco", reason="MUJOCO IS MISSING: the concealed cases are not tested (pip install gecar[bench])"
+    "mujoco", reason="MUJOCO IS MISSING: the concealed cases are not tested (pip install gecar[test])"
 )
 
 from benchmarks.concealed import cases, commands, practice, program
 from benchmarks.concealed.colour_sensor import line_share
+from benchmarks.concealed.comparators.methods import METHODS, changed
 from benchmarks.concealed.drive_train import DriveTrain
+from benchmarks.concealed.exam import Terms, agreed
 from benchmarks.concealed.judging import judge
 from benchmarks.concealed.plan import Counts, plan
+from benchmarks.concealed.results import write_results
 from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.runner import run_all
 from benchmarks.concealed.score import figures, score
 from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth, replayed
+from gecar.reality import discovery
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted((ROOT / "benchmarks" / "concealed").glob("*.py"))
@@ -49,7 +55,7 @@ def test_truth_world_imports_nothing_from_gecar(source):
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        assert not [name for name in names if name.split(".")[0] == "gecar"]
+        assert not [name for name in names if name.split(".")[0] == "gecar" or "comparators" in name]
 
 
 @pytest.mark.skipif(
@@ -97,6 +103,13 @@ def test_scripts_are_whole_percents_held_for_12_seconds(kind):
     assert duties.shape == (1201, 2)
     assert np.array_equal(duties, np.round(duties))
     assert np.abs(duties).max() <= 80
+
+
+def test_line_followers_ask_for_no_more_than_there_is():
+    for seed in range(20):
+        _, follow = commands.line_follower("line_smooth", np.random.default_rng(seed))
+        duties = np.array([follow(0.0, reading) for reading in range(101)])
+        assert np.abs(duties).max() <= 100
 
 
 def test_equal_seeds_give_equal_bytes(examination, tmp_path, monkeypatch):
@@ -183,6 +196,51 @@ def test_runner_resumes_and_reports_what_failed(examination, tmp_path):
     (tmp_path / "a" / "verdict.json").write_text("{}")
     failed = run_all(examination / "cases", tmp_path, "false {case} {out}", 2, 10.0)
     assert failed == ["b", "c"]
+
+
+def test_tool_sees_no_label_and_its_outcome_is_kept(examination, tmp_path):
+    tool = f"{sys.executable} {ROOT / 'tests' / 'silent_tool.py'} {{case}} {{out}}"
+    journal = tmp_path / "outcomes.jsonl"
+    assert run_all(examination / "cases", tmp_path, tool, 1, 60.0, ["b"], journal) == []
+    assert (tmp_path / "b" / "log.txt").read_text().split() == ["b"]
+    line = json.loads(journal.read_text())
+    label = examination / "sealed" / "b" / "label.json"
+    assert line["label_sha256"] == hashlib.sha256(label.read_bytes()).hexdigest()
+    assert (line["case"], line["verdict"], line["named"]) == ("b", "missing", [["backlash", "dead_band"]])
+
+
+def test_no_case_is_begun_after_the_time(examination, tmp_path):
+    assert run_all(examination / "cases", tmp_path, "false", 1, 10.0, until=0.0) == ["a", "b", "c"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_results_count_only_what_ended(examination, tmp_path):
+    tool = f"{sys.executable} {ROOT / 'tests' / 'silent_tool.py'} {{case}} {{out}}"
+    for name, seen in (("gecar", ["a", "b"]), ("bic", ["b"])):
+        verdicts, journal = examination / "verdicts" / name, examination / "outcomes" / f"{name}.jsonl"
+        run_all(examination / "cases", verdicts, tool, 1, 60.0, seen, journal)
+    write_results(examination, Terms(1, 1, 1, 0, 1), tmp_path / "RESULTS.md", 1)
+    text = (tmp_path / "RESULTS.md").read_text()
+    assert "2 of 3 sealed cases have a verdict" in text
+    assert "| `gecar discover` | 1 of 1 | 0 of 1 | 0 of 1 |" in text
+    assert (tmp_path / "RESULTS.png").exists()
+    rows = (tmp_path / "RESULTS.csv").read_text().splitlines()
+    assert [row.split(",")[:2] for row in rows[1:]] == [["gecar", "a"], ["gecar", "b"], ["bic", "b"]]
+
+
+def test_examination_goes_on_with_the_seed_it_began_with(tmp_path):
+    begun = agreed(tmp_path, None, Counts(none=1))
+    assert agreed(tmp_path, None, Counts()) == begun
+    with pytest.raises(ValueError, match="seed"):
+        agreed(tmp_path, begun.seed + 1, Counts())
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_comparators_replace_parts_that_are_there(name):
+    explain = discovery.explain
+    with changed(name):
+        assert all(vars(owner)[part] is other for owner, part, other in METHODS[name])
+    assert discovery.explain is explain
 
 
 def test_program_follows_the_line_to_the_goal(tmp_path):
