@@ -22,6 +22,7 @@ VARIANTS = {
     "random": {"mutation": "renew"},
     "no elite, odd": {"elites": 0, "population": 21},
     "subtree, creep": {"crossover": "subtree", "mutation": "used_codon", "creep_rate": 0.2},
+    "PonyGE2's": {"crossover": "variable_one_point", "mutation": "one_used_codon", "tournament": 2},
     "new programs": {"duplicates": "run", "mutation": "used_codon", "checkpoint_credit": True},
     "lexicase, ptc2": {"selection": "lexicase", "initialisation": "ptc2", "duplicates": "generation"},
 }
@@ -55,7 +56,10 @@ def test_the_paper_preset_is_table_4() -> None:
         ({"crossover_rate": float("nan")}, "search.crossover_rate: found nan"),
         ({"elites": 200}, "search: found elites = 200, expected fewer than population = 200"),
         ({"popluation": 7}, "search.popluation: found an unknown setting, expected one of population, "),
-        ({"mutation": "none"}, "search.mutation: found 'none', expected 'codon', 'used_codon' or 'renew'"),
+        (
+            {"mutation": "none"},
+            "search.mutation: found 'none', expected 'codon', 'used_codon', 'one_used_codon' or 'renew'",
+        ),
     ],
 )
 def test_settings_out_of_bounds_are_refused_by_name(changes: dict[str, object], words: str) -> None:

@@ -8,7 +8,7 @@ from searching import MAPPER, SMALL
 
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
-from gecar.search.crossover import OnePoint, Subtree
+from gecar.search.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.search.initialisation import initialise
 from gecar.search.mutation import Creep, Flip
 from gecar.search.randomness import spawn
@@ -69,6 +69,25 @@ def test_one_point_crossover_within_used_codons_always_touches_them() -> None:
         shared = min(used[i], used[i + 1])
         assert np.array_equal(after[i, 0], before[i, 0])
         assert shared < 2 or np.array_equal(after[i, shared - 1 :], before[i + 1, shared - 1 :])
+
+
+def test_variable_one_point_crossover_joins_a_head_of_one_to_a_tail_of_the_other() -> None:
+    before = np.tile(np.arange(60, dtype=np.uint8), (200, 1))
+    before[1::2] += 100
+    used = MAPPER.map(before).used
+    after = VariableOnePoint(1.0)(before.copy(), MAPPER, spawn(1, 1, 0, 200)).astype(int)
+    cuts = np.argmax(after[::2] >= 100, axis=1)
+    assert (cuts >= 1).all()
+    assert (cuts <= used[::2]).all()
+    tails = {tuple(row[cut:][row[cut:] >= 100] - 100) for row, cut in zip(after[::2], cuts, strict=True)}
+    assert {tail[0] for tail in tails} == set(range(1, used[1] + 1))  # the other's point is its own
+    assert all(tail == tuple(range(tail[0], tail[0] + len(tail))) for tail in tails)
+
+
+def test_mutation_of_one_used_codon_changes_one_on_average() -> None:
+    before = random_genomes(2_000)
+    after = Flip(None, within_used=True)(before.copy(), MAPPER, spawn(1, 1, 0, 2_000))
+    assert abs((after != before).sum() / 2_000 - 255 / 256) < 0.1
 
 
 @given(st.integers(0, 2**32), st.sampled_from([12, 60, 300]))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.language.mapping import Mapper
-from gecar.search.crossover import OnePoint, Subtree
+from gecar.search.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.search.fitness import Scores, merit
 from gecar.search.initialisation import initialise
 from gecar.search.lineage import CREEP, CROSSOVER, MUTATION, differs

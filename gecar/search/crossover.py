@@ -58,6 +58,39 @@ def _swap_tails(genomes: Bytes, reach: Int32s, rate: float, streams: Streams) ->
 
 
 @dataclass(frozen=True)
+class VariableOnePoint:
+    """Genomes exchange what stands behind a point of its own in either, within what it uses (PonyGE2's default).
+
+    What grows beyond the genome is cut, what is missing at its end stays as it was.
+
+    Attributes
+    ----------
+    rate
+        Share of pairs that do.
+    """
+
+    rate: float
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        children = genomes.copy()
+        _swap_any_tails(
+            genomes, children, used_codons(mapper.map(genomes), genomes.shape[1]), self.rate, streams
+        )
+        return children
+
+
+@compiled
+def _swap_any_tails(genomes: Bytes, children: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+    codons = genomes.shape[1]
+    for i in range(0, genomes.shape[0] - 1, 2):
+        if uniform(streams[i]) < rate and reach[i] > 0 and reach[i + 1] > 0:
+            a, b = 1 + below(streams[i], reach[i]), 1 + below(streams[i], reach[i + 1])
+            _splice(children[i], genomes[i], a, codons, genomes[i + 1], b, min(codons, b + codons - a))
+            _splice(children[i + 1], genomes[i + 1], b, codons, genomes[i], a, min(codons, a + codons - b))
+
+
+@dataclass(frozen=True)
 class Subtree:
     """Genomes exchange the codons of two subtrees with the same nonterminal (Harper and Blair 2005, LHS crossover).
 

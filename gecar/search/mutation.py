@@ -20,6 +20,7 @@ from gecar.world.randomness import uniform
 
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float64]
 Int32s = npt.NDArray[np.int32]
 Int64s = npt.NDArray[np.int64]
 
@@ -31,12 +32,12 @@ class Flip:
     Attributes
     ----------
     rate
-        Probability of each.
+        Probability of each; None for one codon on average.
     within_used
         Whether only codons that the derivation reads.
     """
 
-    rate: float
+    rate: float | None
     within_used: bool = False
 
     def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
@@ -45,15 +46,16 @@ class Flip:
         reach = np.full(len(genomes), codons, np.int32)
         if self.within_used:
             reach = used_codons(mapper.map(genomes), codons)
-        _flip(genomes, reach, self.rate, streams)
+        rates = 1.0 / np.maximum(reach, 1) if self.rate is None else np.full(len(genomes), self.rate)
+        _flip(genomes, reach, rates, streams)
         return genomes
 
 
 @compiled
-def _flip(genomes: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+def _flip(genomes: Bytes, reach: Int32s, rates: Floats, streams: Streams) -> None:
     for i in range(genomes.shape[0]):
         for k in range(reach[i]):
-            if uniform(streams[i]) < rate:
+            if uniform(streams[i]) < rates[i]:
                 genomes[i, k] = below(streams[i], 256)
 
 

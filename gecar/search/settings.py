@@ -46,12 +46,14 @@ class Settings(BaseModel):
         checkpoints, and pass them sooner.
     crossover
         ``one_point``: anywhere in the genome, the same point in both. ``one_point_used``: within the codons
-        both parents use. ``subtree``: subtrees of the same nonterminal change places.
+        both parents use. ``variable_one_point``: within the codons each parent uses, a point of its own in either
+        (PonyGE2's default). ``subtree``: subtrees of the same nonterminal change places.
     crossover_rate
         Share of pairs that are crossed.
     mutation
-        ``codon``: any codon of the genome. ``used_codon``: only codons the child uses. ``renew``: every child
-        is a new random individual, which makes the whole a random search.
+        ``codon``: any codon of the genome. ``used_codon``: only codons the child uses. ``one_used_codon``: the
+        same with one codon a child on average, whatever `mutation_rate` says (PonyGE2's default). ``renew``:
+        every child is a new random individual, which makes the whole a random search.
     mutation_rate
         Probability of a codon to be drawn anew.
     creep_rate
@@ -75,9 +77,9 @@ class Settings(BaseModel):
     selection: Literal["tournament", "lexicase"] = "tournament"
     tournament: int = Field(5, ge=1, le=1_000_000)
     checkpoint_credit: bool = False
-    crossover: Literal["one_point", "one_point_used", "subtree"] = "one_point"
+    crossover: Literal["one_point", "one_point_used", "variable_one_point", "subtree"] = "one_point"
     crossover_rate: Rate = 0.5
-    mutation: Literal["codon", "used_codon", "renew"] = "codon"
+    mutation: Literal["codon", "used_codon", "one_used_codon", "renew"] = "codon"
     mutation_rate: Rate = 0.05
     creep_rate: Rate = 0.0
     duplicates: Literal["kept", "generation", "run"] = "kept"
