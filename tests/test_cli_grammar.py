@@ -24,6 +24,12 @@ def test_derive_says_where_the_codons_ran_out(gecar):
     assert "Invalid: the codons ran out at <code><code><code>" in ended.out
 
 
+def test_derive_draws_a_tree_and_says_where(gecar, tmp_path):
+    ended = gecar("grammar", "derive", "table1", "302122", "--picture", tmp_path / "tree.png")
+    assert f"Picture: {tmp_path}/tree.png" in ended.out
+    assert (tmp_path / "tree.png").stat().st_size > 1_000
+
+
 def test_map_gives_programs_as_people_read_them(gecar):
     ended = gecar("grammar", "map", "paper", "1,18,10,5")
     assert "motor(80,0,50)" in ended.out
@@ -49,6 +55,8 @@ def test_check_warns_of_what_nothing_reaches(gecar, tmp_path):
         (("derive", "paper", "1,256"), "256"),
         (("derive", "paper", "1,x"), "'x'"),
         (("derive", "paper", ""), "codons"),
+        (("derive", "table1", "30", "--picture", "x.png"), "a derivation that finishes"),
+        (("derive", "table1", "302122", "--picture", "x.gif"), ".png"),
         (("map", "paper", "--count", "0"), "--count"),
         (("map", "paper", "--seed", "-1"), "--seed"),
         (("map", "paper", "1", "--wraps", "-1"), "wraps"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -90,18 +91,31 @@ def derive(
     genome: GenomeArgument,
     wraps: WrapsOption = 0,
     single_choice_consumes: ConsumesOption = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--picture", metavar="FILE", help="Draw it as a tree: .png, .pdf or .svg.", show_default=False
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a derivation step by step, as in the paper's Table 2.
+    """Show a derivation step by step, as in the paper's Table 2; draw it as a tree if asked.
 
-    [bold]Example[/]
+    [bold]Examples[/]
 
       gecar grammar derive table1 302122
+      gecar grammar derive table1 302122 --picture tree.png
     """
     from rich.table import Table
 
     voice = Voice(as_json)
     mapper = _mapper(name, wraps, single_choice_consumes)
+    if picture is not None:
+        from gecar.plots.style import picture_kind, save
+        from gecar.plots.tree import tree_of
+
+        picture_kind(picture)
+        save(tree_of(mapper, codons(genome)), picture)
     steps = list(mapper.derive(codons(genome)))
     table = Table("S_n", "r_A", "m", "A", "selected", "replaced symbol", box=None, pad_edge=False)
     for step in steps:
@@ -114,8 +128,16 @@ def derive(
         if steps[-1].finished
         else f"Invalid: the codons ran out at {steps[-1].form}"
     )
-    voice.answer({"valid": steps[-1].finished, "phenotype": steps[-1].form if steps[-1].finished else None,
-                  "steps": [vars(step) for step in steps]})  # fmt: skip
+    if picture is not None:
+        voice.say(f"Picture: {picture}")
+    voice.answer(
+        {
+            "valid": steps[-1].finished,
+            "phenotype": steps[-1].form if steps[-1].finished else None,
+            "steps": [vars(step) for step in steps],
+            "picture": None if picture is None else str(picture),
+        }
+    )
 
 
 @grammar.command("map")
