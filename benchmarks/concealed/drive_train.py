@@ -130,7 +130,7 @@ class DriveTrain:
             volts = self._limited(volts, speed)
         torque = _STALL_TORQUE_PER_VOLT * volts
         if hidden.direction_gain != 0.0 and volts != 0.0:
-            torque *= 1.0 + math.copysign(hidden.direction_gain, volts)
+            torque *= 1.0 + hidden.direction_gain * math.copysign(1.0, volts)
         if hidden.friction_ratio != 0.0:
             torque -= (
                 hidden.friction_ratio * hidden.coulomb_friction

@@ -25,7 +25,7 @@ WORDS = {
 }
 _COLUMNS = (
     "tool", "case", "kind", "concealed", "d_prime", "verdict", "said", "right", "channel_right", "regime_overlap",
-    "gap_closed", "intervals_right", "intervals", "wall_s",
+    "gap_closed", "intervals_right", "intervals", "cpu_s",
 )  # fmt: skip
 
 
@@ -45,7 +45,7 @@ def write_results(out: Path, terms: Terms, path: Path, workers: int) -> None:
     """
     tools = [tool for tool in (GECAR, *COMPARATORS) if any((out / "verdicts" / tool).glob("*/verdict.json"))]
     judged = {tool: score(out, out / "verdicts" / tool, workers) for tool in tools}
-    times = {tool: wall_times(out / "outcomes" / f"{tool}.jsonl") for tool in tools}
+    times = {tool: times_taken(out / "outcomes" / f"{tool}.jsonl") for tool in tools}
     sealed = sum(1 for folder in (out / "sealed").iterdir() if folder.is_dir())
     path.parent.mkdir(parents=True, exist_ok=True)
     text = report(judged.get(GECAR, []), "Concealed cases: results", manifest_hash(out), sealed)
@@ -57,18 +57,18 @@ def write_results(out: Path, terms: Terms, path: Path, workers: int) -> None:
     _write_rows(path.with_suffix(".csv"), judged, times)
 
 
-def wall_times(journal: Path) -> dict[str, float]:
-    """Read how long each case took [s]; nan for one that ended without a verdict. A case's last line counts."""
+def times_taken(journal: Path) -> dict[str, float]:
+    """Read the processor time of each case [s]; nan where it ended without a verdict. A case's last line counts."""
     if not journal.exists():
         return {}
     lines = [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines() if line]
-    return {line["case"]: float(line["wall_s"]) if line["verdict"] else math.nan for line in lines}
+    return {line["case"]: float(line["cpu_s"]) if line["verdict"] else math.nan for line in lines}
 
 
 def _about(terms: Terms, times: Mapping[str, float]) -> str:
     planned = f"{terms.none} nothing, {terms.single} one effect, {terms.double} two, {terms.outside} outside"
     known = [time for time in times.values() if not math.isnan(time)]
-    pace = f"{median(known):.0f} s a case (median, one core each)" if known else "-"
+    pace = f"{median(known):.0f} s of processor time a case (median)" if known else "-"
     return (
         f"Seed {terms.seed}; planned: {planned}. `gecar discover` took {pace}; {len(times) - len(known)} cases ended "
         "without a verdict. Made by `make concealed`; the CSV file of the same name has a row a case.\n"
@@ -84,7 +84,7 @@ def _comparison(judged: Mapping[str, Sequence[Judged]], times: Mapping[str, Mapp
         "else; wrong: a name that is not there; missed: the rest. Those that can not abstain never do.\n\n"
     )
     text += "| tool | one effect: right | wrong | missed | two: right | wrong | missed | nothing: names something "
-    text += "| outside: abstains | names something | s a case |\n" + "|---" * 11 + "|\n"
+    text += "| outside: abstains | names something | processor s a case |\n" + "|---" * 11 + "|\n"
     for tool, cases in judged.items():
         of = {k: [c for c in cases if c.kind == k and c.name in common] for k in _KINDS}
         cells = [

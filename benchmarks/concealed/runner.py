@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -111,24 +112,35 @@ def _run(case: Path, out: Path, template: str, timeout_s: float, journal: Path |
         copy = Path(shutil.copytree(case, Path(elsewhere) / case.name))
         holdout = ",".join(holdout_names(case))
         words = [part.format(case=copy, out=out.resolve(), holdout=holdout) for part in shlex.split(template)]
-        try:
-            subprocess.run(words, stdout=log, stderr=log, timeout=timeout_s, check=False, env=_environment())
-        except subprocess.TimeoutExpired:
+        cpu_s = _waited(subprocess.Popen(words, stdout=log, stderr=log, env=_environment()), timeout_s)
+        wall_s = time.monotonic() - began
+        if wall_s >= timeout_s:
             log.write(f"given up after {timeout_s:g} s\n")
     there = (out / "verdict.json").exists()
     if journal is not None:
-        _note(journal, case, out / "verdict.json" if there else None, time.monotonic() - began)
+        times = {"cpu_s": round(cpu_s, 2), "wall_s": round(wall_s, 2)}
+        _note(journal, case, out / "verdict.json" if there else None, times)
     return there
 
 
-def _note(journal: Path, case: Path, path: Path | None, wall_s: float) -> None:
+def _waited(process: subprocess.Popen[bytes], timeout_s: float) -> float:
+    """Wait for a process, or end it; return the processor time it took [s]."""
+    timer = threading.Timer(timeout_s, process.kill)
+    timer.start()
+    _, status, used = os.wait4(process.pid, 0)
+    timer.cancel()
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return used.ru_utime + used.ru_stime
+
+
+def _note(journal: Path, case: Path, path: Path | None, times: dict[str, float]) -> None:
     """Append one line: which case, hashes of its sealed label and of the verdict, and what the verdict says."""
     label = case.parent.parent / "sealed" / case.name / "label.json"
     line: dict[str, Any] = {
         "case": case.name,
         "label_sha256": _digest(label) if label.exists() else None,
         "verdict": None,
-        "wall_s": round(wall_s, 2),
+        **times,
         "ended": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     if path is not None:
