@@ -22,7 +22,7 @@ from benchmarks.concealed.comparators.methods import METHODS, changed
 from benchmarks.concealed.drive_train import DriveTrain
 from benchmarks.concealed.exam import Terms, agreed
 from benchmarks.concealed.judging import judge
-from benchmarks.concealed.plan import Counts, plan
+from benchmarks.concealed.plan import Counts, draw_all, plan
 from benchmarks.concealed.results import write_results
 from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.runner import run_all
@@ -133,6 +133,8 @@ def test_a_changed_label_breaks_the_seal(examination, tmp_path):
     assert cases.broken_seals(examination) == []
     label.write_bytes(whole + b" ")
     assert cases.broken_seals(examination) == ["sealed/b/label.json"]
+    with pytest.raises(ValueError, match="changed since sealed"):
+        draw_all([], examination, 1)
     label.write_bytes(whole)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.concealed.cases import draw_case, seal
+from benchmarks.concealed.cases import broken_seals, draw_case, seal
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.outside import OUTSIDE
 
@@ -79,7 +79,16 @@ def draw_all(cases: Iterable[Planned], out: Path, workers: int) -> str:
     -------
     str
         Hash of the manifest.
+
+    Raises
+    ------
+    ValueError
+        If a case is not what it was when it was sealed.
     """
+    # What is sealed stays so: an examination that goes on is not sealed anew, unless there are more cases.
+    if (out / "manifest.sha256").exists() and (broken := broken_seals(out)):
+        message = f"changed since sealed: {', '.join(broken[:5])}"
+        raise ValueError(message)
     # The label is written last: a case that has one is whole.
     missing = [case for case in cases if not (out / "sealed" / case.name / "label.json").exists()]
     with ProcessPoolExecutor(workers) as pool:
