@@ -31,7 +31,10 @@ The characters of the map are in `gecar.world.tiles`. Everything else is optiona
                       the floor and whatever touches it; ``movable`` (true)
 ``[image]``           ``file`` beside the course file and ``pixels_per_metre``: the floor as scanned or
                       photographed, lower left corner on the field's, instead of the tiles' lines;
-                      ``white`` (255), ``black`` (0): its grey levels on bare floor and on the line
+                      ``white`` (255), ``black`` (0): its grey levels on bare floor and on the line;
+                      taken at a slant: ``marks_px`` instead of the scale, four or more ``[x, y]`` from the
+                      picture's upper left corner, and ``marks_m``, where they are on the field (its corners,
+                      counter-clockwise from the lower left)
 ====================  ======================================================================================
 """
 
@@ -117,9 +120,21 @@ class ImageTable(_Table):
     """A picture of the floor."""
 
     file: Annotated[str, Field(min_length=1)]
-    pixels_per_metre: _Positive
+    pixels_per_metre: _Positive | None = None
+    marks_px: Annotated[list[_Point], Field(max_length=100)] | None = None
+    marks_m: Annotated[list[_Point], Field(max_length=100)] | None = None
     white: _Level = 255.0
     black: _Level = 0.0
+
+    @model_validator(mode="after")
+    def _has_a_scale(self) -> ImageTable:
+        if self.pixels_per_metre is None and self.marks_px is None:
+            raise ValueError("found no scale, expected pixels_per_metre, or marks_px of a photograph")
+        if self.pixels_per_metre is not None and self.marks_px is not None:
+            raise ValueError("found both pixels_per_metre and marks_px, expected one of them")
+        if self.marks_m is not None and self.marks_px is None:
+            raise ValueError("found marks_m without marks_px, expected both")
+        return self
 
     @model_validator(mode="after")
     def _has_contrast(self) -> ImageTable:

@@ -54,6 +54,8 @@ left_m = {left:g}     # the robot stands beside the line, so that the colour sen
 # [image]                 # a scan or photograph of the floor, instead of the line drawn from the tiles
 # file = "scan.png"
 # pixels_per_metre = 1000
+# marks_px = [[210, 1490], [1890, 1510], [1620, 420], [430, 400]]    # instead of the scale: the field's corners in a
+#                                                                   # photograph, counter-clockwise from the lower left
 '''
 
 

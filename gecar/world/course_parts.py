@@ -16,6 +16,7 @@ from gecar.world import order, raster
 from gecar.world.course_file import CourseTable, ObstacleTable
 from gecar.world.layout import Layout, Pose, check_lines_join, read_map
 from gecar.world.obstacle import Obstacle
+from gecar.world.photograph import straightened
 from gecar.world.raster import PITCH_M, FloorImage
 
 
@@ -130,13 +131,26 @@ class _Builder:
         if given is None:
             return None
         grey = raster.read_image(Path(self.source).parent / given.file, where)
-        size = [n / given.pixels_per_metre for n in grey.shape[::-1]]
-        wanted = [self.layout.width_m, self.layout.height_m]
-        if any(abs(a - b) > 0.02 * b for a, b in zip(size, wanted, strict=True)):
-            found = f"{size[0]:.3g} x {size[1]:.3g} m at {given.pixels_per_metre:g} pixels per metre"
-            raise expected(where, found, f"the field's {wanted[0]:g} x {wanted[1]:g} m, within 2 %")
+        width, height = self.layout.width_m, self.layout.height_m
+        if given.pixels_per_metre is None:
+            per_metre = 1.0 / PITCH_M
+            corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+            marks = given.marks_px or [], given.marks_m or corners
+            grey = straightened(grey, *marks, (width, height), per_metre, where)
+        else:
+            per_metre = given.pixels_per_metre
+            _check_size(grey, per_metre, (width, height), where)
         level = (grey - given.black) * (255.0 / (given.white - given.black))
-        return FloorImage(np.clip(level + 0.5, 0, 255).astype(np.uint8), given.pixels_per_metre)
+        return FloorImage(np.clip(level + 0.5, 0, 255).astype(np.uint8), per_metre)
+
+
+def _check_size(
+    grey: npt.NDArray[np.uint8], per_metre: float, wanted: tuple[float, float], where: str
+) -> None:
+    size = [n / per_metre for n in grey.shape[::-1]]
+    if any(abs(a - b) > 0.02 * b for a, b in zip(size, wanted, strict=True)):
+        found = f"{size[0]:.3g} x {size[1]:.3g} m at {per_metre:g} pixels per metre"
+        raise expected(where, found, f"the field's {wanted[0]:g} x {wanted[1]:g} m, within 2 %")
 
 
 def _obstacle(given: ObstacleTable) -> Obstacle:
