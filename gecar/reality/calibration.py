@@ -4,7 +4,9 @@ result = calibrate(read_case("recordings/monday"))
 write_robot(result.robot, Path("robot.toml"))
 
 A constant is fitted where the recordings tell it from those already fitted. What moves the robot is fitted first, on
-its commands replayed open loop; then what the colour sensor reads, along the measured path.
+its commands replayed open loop; then what the colour sensor reads, along the measured path. Errors of the camera's own
+(a mark that is not over the axle's centre, a frame that is not the course's) are fitted with them, belong to no robot,
+and are taken out of the recordings before robots are judged on them.
 
 Sources: identifiability by the sensitivities' condition, Ljung, System Identification (2nd ed.), ch. 4 and 13;
 intervals by the delete-a-group jackknife with Student's t, Efron and Tibshirani, An Introduction to the Bootstrap
@@ -23,11 +25,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
+from gecar.reality.camera import corrected
 from gecar.reality.comparison import Comparison, Strip
-from gecar.reality.constants import Constant, Slack, chosen, with_constants
-from gecar.reality.fitting import fit
+from gecar.reality.constant_fit import fitted
+from gecar.reality.constants import MARK, Constant, Slack, chosen, with_constants
 from gecar.reality.holdout import Misfit, Split, judge, split
-from gecar.reality.identifiable import BLIND, PROBE, at_bounds, sensitivities, told_apart
+from gecar.reality.identifiable import BLIND, at_bounds, sensitivities, told_apart
 from gecar.reality.noise import Noise, estimate_noise
 from gecar.reality.recording import Case, Recording
 from gecar.world.course import Course, load_course
@@ -41,6 +44,11 @@ FEWEST_GROUPS = 5
 # What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
 TRUST_STEPS = 0.15
 ROUNDS = 4
+COURSE = (
+    "line_dx",
+    "line_dy",
+    "line_angle",
+)  # the course in the camera's frame: fields of the `PHYSICS` record
 
 
 @dataclass(frozen=True)
@@ -135,6 +143,7 @@ def calibrate(
         motion = Comparison(strips, False, pool)
         moved = _settle(motion, known, tuple(c for c in constants if not c.sight))
         better = _taken(known, moved)
+        motion.set_mark(_camera(moved, MARK))
         sight = Comparison(strips, True, pool)
         sight.set_path(better.physics)
         seen = _settle(sight, better, tuple(c for c in constants if c.sight))
@@ -142,7 +151,8 @@ def calibrate(
         better, {f.constant.name: f.value for f in seen.fitted}, f"{known.name}-{case.name}"
     )
     tell("judging on recordings that were held out")
-    channels, each = _judged(parts, noise, known, calibrated)
+    clear = _clear(parts, _camera(moved, MARK), _camera(seen, COURSE))
+    channels, each = _judged(clear, noise, known, calibrated)
     return Calibration(
         case.name, calibrated, moved.fitted + seen.fitted, moved.unknown + seen.unknown,
         tuple(r.name for r in parts.fitted), tuple(r.name for r in parts.held), parts.by_time, channels, each,
@@ -157,6 +167,18 @@ class _Settled:
 
 def _taken(robot: Robot, settled: _Settled) -> Robot:
     return with_constants(robot, {f.constant.name: f.value for f in settled.fitted})
+
+
+def _camera(settled: _Settled, fields: Sequence[str]) -> Array:
+    """Return what was fitted of the camera, 0 where nothing was, shape (fields,)."""
+    found = {f.constant.kernel: f.value for f in settled.fitted if f.constant.section == "camera"}
+    return np.array([found.get(field, 0.0) for field in fields])
+
+
+def _clear(parts: Split, mark: Array, course: Array) -> Split:
+    """Return recordings with the camera's own errors taken out, so that robots are judged by what robots do."""
+    fitted, held = (tuple(corrected(r, mark, course) for r in some) for some in (parts.fitted, parts.held))
+    return Split(fitted, held, parts.by_time)
 
 
 def _strips(recordings: Sequence[Recording], noise: Noise) -> list[Strip]:
@@ -175,7 +197,7 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
     everything = Slack(robot, constants)
     z = np.zeros(len(constants))
     told, reasons = np.zeros(len(constants), bool), dict.fromkeys(range(len(constants)), BLIND)
-    if not constants or not comparison.strips or not len(comparison.errors(robot.physics)):
+    if not constants or not comparison.strips or not len(everything.errors(comparison, z)):
         return _Settled(
             (),
             tuple(Unknown(c, float(v), BLIND) for c, v in zip(constants, everything.standing, strict=True)),
@@ -186,7 +208,7 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
         if (found == told).all():
             break
         told = found
-        z = _fitted(comparison, everything, told)
+        z = fitted(comparison, everything, told, np.where(told, z, 0.0))
         pressed |= at_bounds(everything, z, told)
     spread = _spread(comparison, everything, z, told)
     values = everything.values(z)
@@ -199,27 +221,6 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
               for k, c in enumerate(constants) if told[k]),
         tuple(Unknown(c, float(everything.standing[k]), reasons[k]) for k, c in enumerate(constants) if not told[k]),
     )  # fmt: skip
-
-
-def _fitted(comparison: Comparison, slack: Slack, told: npt.NDArray[np.bool_]) -> Array:
-    """Fit the constants told, the others at their nominal values."""
-
-    def whole(part: Array) -> Array:
-        z = np.zeros(len(told))
-        z[told] = part
-        return z
-
-    if not told.any():
-        return np.zeros(len(told))
-    low, high = slack.bounds
-    ended = fit(
-        lambda part: comparison.errors(slack.physics(whole(part))),
-        np.zeros(int(told.sum())),
-        (low[told], high[told]),
-        np.full(int(told.sum()), PROBE),
-        rounds=20,
-    )
-    return whole(ended.z)
 
 
 def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> Array:

@@ -157,6 +157,11 @@ class Comparison:
         for strip, offset in zip(self.strips, offsets, strict=True):
             strip.film.offset_s = float(offset)
 
+    def set_mark(self, mark: Array) -> None:
+        """Take the poses to be those of a camera's mark on the robot; see `axle_pose`."""
+        for strip in self.strips:
+            strip.film.set_mark(mark)
+
     @property
     def cells(self) -> Cells:
         """Where each residual comes from; known after the first `errors`."""

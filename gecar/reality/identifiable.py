@@ -26,9 +26,9 @@ BLIND = "nothing in these recordings depends on it"
 
 def sensitivities(comparison: Comparison, slack: Slack, z: Array) -> tuple[Array, Array]:
     """Return (residuals, their derivatives), each times the root of its robust weight."""
-    errors = comparison.errors(slack.physics(z))
+    errors = slack.errors(comparison, z)
     high = slack.bounds[1]
-    slopes = jacobian(lambda v: comparison.errors(slack.physics(v)), z, errors, np.full(len(z), PROBE), high)
+    slopes = jacobian(lambda v: slack.errors(comparison, v), z, errors, np.full(len(z), PROBE), high)
     root = np.sqrt(weights(errors))
     return errors * root, slopes * root[:, None]
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
+from gecar.reality.camera import axle_pose
 from gecar.reality.following import ROW_COLUMNS, Reel, follow
 from gecar.reality.recording import Recording
 from gecar.world.robot import Robot
@@ -80,14 +81,15 @@ class Film:
         commands = r.commands
         if zero < first:
             t, commands = np.r_[0.0, t], np.vstack([commands[:1], commands])
+        self._seen = pose[self.posed]
         self._extra = len(t) - len(r.t_s)
         measured = np.column_stack([r.left_angle_rad, r.right_angle_rad, r.battery_v, r.yaw_rate_rad_s])
         measured = np.vstack([np.full((self._extra, 4), np.nan), measured])
         self.reel = Reel(
-            t, commands, measured, t[self._extra :][self.posed], pose[self.posed],
+            t, commands, measured, t[self._extra :][self.posed], self._seen,
             np.array(sd, float), np.array(walk, float), memory_s, r.setup.rig == "bench",
         )  # fmt: skip
-        self.start = self._recorded_start(pose)
+        self.start = self._recorded_start(self._seen)
         self._derived, self._state = np.zeros(1, DERIVED), np.zeros(1, STATE)
 
     def _recorded_start(self, pose: Array) -> Array:
@@ -97,6 +99,11 @@ class Film:
             seen = np.flatnonzero(~np.isnan(pose[:, k]))
             start[k] = pose[seen[0], k] if len(seen) else 0.0
         return start
+
+    def set_mark(self, mark: Array) -> None:
+        """Take the poses to be those of a mark on the robot; see `axle_pose`."""
+        pose = axle_pose(self._seen, mark)
+        self.reel, self.start = self.reel._replace(pose=pose), self._recorded_start(pose)
 
     @property
     def t(self) -> Array:
