@@ -399,7 +399,7 @@ def test_a_preset_is_changed_setting_by_setting_and_replaced_as_a_whole() -> Non
         ({"step_s": 1.0}, "my.toml, step_s: found 1.0, expected less than or equal to 0.01"),
         ({"search": 3}, "my.toml, search: found 3, expected a table of settings"),
         ({"search": {"tournament": 0}}, "my.toml, search.tournament: found 0, expected greater"),
-        ({"preset": "best"}, "preset: found 'best', expected one of paper, random"),
+        ({"preset": "best"}, "preset: found 'best', expected one of paper, random, better"),
     ],
 )
 def test_a_wrong_configuration_is_refused_by_field(table: dict[str, Any], words: str) -> None:

@@ -70,7 +70,7 @@ def test_settings_out_of_bounds_are_refused_by_name(changes: dict[str, object], 
 
 
 def test_an_unknown_preset_is_refused() -> None:
-    with pytest.raises(InputError, match="preset: found 'best', expected one of paper, random"):
+    with pytest.raises(InputError, match="preset: found 'best', expected one of paper, random, better"):
         preset("best")
 
 

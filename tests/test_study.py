@@ -7,6 +7,7 @@ from gecar.errors import InputError
 from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
 from gecar.results.cells import cells_of, difference_p
 from gecar.results.performing import Workplace, perform, perform_all
+from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.results.study import Axis, Study, StudyFolder, read_study
 
 SMALL = {"workers": 1, "search": {"population": 10, "generations": 1, "codons": 50}}
@@ -114,6 +115,34 @@ def test_a_setting_that_always_helps_is_told_from_chance():
     runs = study(seeds=tuple(range(8))).plan()
     better = [record(run, 20.0 + run.config.seed - 3.0 * run.row) for run in runs]
     assert difference_p(cells_of(runs, better)) < 0.001
+
+
+def test_cells_are_contrasted_as_the_field_does():
+    runs = study(seeds=tuple(range(8))).plan()
+    cells = cells_of(runs, [record(run, 1e4 if run.row else 20.0 + run.config.seed) for run in runs])
+    slower, equal = contrast(cells[2], cells[0]), contrast(cells[1], cells[0])
+    assert slower.a12 == 0.0  # never at GOAL is slower than any
+    assert slower.p < 0.001
+    assert equal == (1.0, 0.5)
+    assert "| 1 | 0.1 | 0.00 |" in markdown(study(), cells, {}, "about")
+
+
+def test_holms_correction_is_that_of_his_paper():
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_a_medians_interval_holds_it_and_narrows_with_more_runs():
+    few, many = np.linspace(14.0, 16.0, 9), np.linspace(14.0, 16.0, 99)
+    (low, high), (lower, higher) = median_interval(few), median_interval(many)
+    assert low < lower < 15.0 < higher < high
+    assert median_interval(np.array([1.0, np.inf, np.inf]))[1] == np.inf
+
+
+def test_evaluations_to_a_time_are_those_of_the_first_generation_that_reached_it():
+    runs = study().plan()[:4]
+    history = {"generation": [0, 1, 2], "best": [30.0, 17.0, 16.0], "evaluations": [10, 20, 30]}
+    cells = cells_of(runs, [record(run, 16.0) | {"history": history} for run in runs])
+    assert [evaluations_to(cells[0], time_s)[0] for time_s in (30.0, 16.74, 15.0)] == [10, 30, np.inf]
 
 
 def test_the_table_stands_beside_the_papers():

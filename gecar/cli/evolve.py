@@ -33,7 +33,7 @@ def evolve(
                        help="Settings, as in the config.toml of a run's folder; options override them."),
     ] = None,
     preset: Annotated[
-        str | None, _search("--preset", "Search settings: paper is Table 4; random is random search.", "paper", "NAME")
+        str | None, _search("--preset", "Search settings: better, paper (Table 4) or random.", "better", "NAME")
     ] = None,
     population: Annotated[int | None, _search("--population", "Programs in a generation; paper: 200.")] = None,
     generations: Annotated[int | None, _search("--generations", "How often they are bred anew; paper: 50.")] = None,
@@ -107,7 +107,7 @@ def evolve(
 
       gecar evolve
       gecar evolve --course hairpin --seed 7 --out runs/hairpin-7
-      gecar evolve --crossover-rate 0.7 --mutation-rate 0.03 --population 500
+      gecar evolve --preset paper --crossover-rate 0.7 --mutation-rate 0.03
       gecar evolve runs/hairpin-7/config.toml --seed 8
       gecar evolve --resume --out runs/hairpin-7
     """

@@ -18,6 +18,7 @@ from gecar.report.drive import sentence_of, standing_of
 from gecar.report.run import effort_of
 from gecar.results.config import configure, merged, read_config
 from gecar.results.running import Started, finish, resume, start
+from gecar.search.settings import DEFAULT_PRESET
 from gecar.world.rollout import simulate
 
 
@@ -27,7 +28,7 @@ def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: b
     Parameters
     ----------
     file
-        Settings.
+        Settings; where neither it nor the options name a preset, it is `DEFAULT_PRESET`.
     changes
         Options, laid over them.
     out
@@ -40,7 +41,7 @@ def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: b
     InputError
         As `gecar.results.running.start` or `resume`.
     """
-    table = merged(read_config(file) if file else {}, changes)
+    table = merged({"preset": DEFAULT_PRESET} | (read_config(file) if file else {}), changes)
     wanted = configure(table, file or "options")
     folder = out or Path("runs") / f"{Path(wanted.course).stem}-{wanted.preset}-seed{wanted.seed}"
     return resume(folder, table if file else changes) if again else start(wanted, folder)

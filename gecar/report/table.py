@@ -11,6 +11,7 @@ from typing import Any
 from rich.table import Table
 
 from gecar.results.cells import Cell, difference_p
+from gecar.results.statistics import contrast, holm
 from gecar.results.study import TABLE_5, Planned, Study
 
 PAPER_TABLE_5: Mapping[tuple[float, float], float] = {
@@ -68,7 +69,31 @@ def markdown(
     p = difference_p(cells)
     if p is not None:
         blocks.append(f"Do the cells differ at all? Friedman over the seeds: p = {p:.2g}.")
+    blocks += [contrasts(study, cells)] if len(cells) > 1 and all(cell.records for cell in cells) else []
     return "\n\n".join(blocks) + "\n"
+
+
+def contrasts(study: Study, cells: Sequence[Cell]) -> str:
+    """Write each cell against the first as Markdown.
+
+    Parameters
+    ----------
+    study
+        What was varied.
+    cells
+        At least two, each with a run.
+    """
+    first, *others = cells
+    found = [contrast(cell, first) for cell in others]
+    corrected = holm([test.p for test in found])
+    lines = [[setting_words(study.rows.name), setting_words(study.columns.name), "A12", "p"]]
+    for cell, test, p in zip(others, found, corrected, strict=True):
+        lines.append([str(cell.row), str(cell.column), f"{test.a12:.2f}", f"{p:.2g}"])
+    note = (
+        f"Against the first cell ({first.row}, {first.column}): A12 is how often a run is faster than one of the "
+        "first cell's (Vargha and Delaney; 0.5 is no difference), p the Mann-Whitney test's, corrected by Holm."
+    )
+    return f"{_piped(lines)}\n\n{note}"
 
 
 def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
