@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gecar import reality
 from gecar.errors import InputError
 from gecar.plots.discovery import verdict_figures
+from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
-from gecar.reality.formula import NAMES
+from gecar.reality.formula import NAMES, Formula
 from gecar.reality.holdout import split
 from gecar.reality.recording import Case, Recording, make_recording, read_case
 from gecar.reality.replay import Film
@@ -30,15 +32,15 @@ EV3 = load_robot("ev3")
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
 
 
-def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor") -> Recording:
+def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor", most: int = 7) -> Recording:
     """Held duties drawn by chance, encoders in whole degrees, a camera at 33 Hz with 1 mm and 0.3 degrees of noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
-    duty = np.repeat(rng.integers(-7, 8, (2, int(seconds / 0.8) + 1)) * 10, 80, axis=1)[:, : len(t)].astype(
-        float
-    )
+    duty = np.repeat(rng.integers(-most, most + 1, (2, int(seconds / 0.8) + 1)) * 10, 80, axis=1)[
+        :, : len(t)
+    ].astype(float)
     columns = {"t_s": t, "left_duty_pct": duty[0], "right_duty_pct": duty[1]}
-    setup = Setup(rig=rig, course="none")
+    setup = Setup(rig=rig, course="none", duty_cap=1.0)
     rows = Film(make_recording("made", columns, setup)).play(robot.physics, np.array([1.0, 0.5, 0.3]))[0]
     columns |= {
         "left_angle_deg": np.round(np.degrees(rows[:, 0])),
@@ -147,3 +149,34 @@ def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
     assert tilt.low < 0.06 < tilt.high
     assert verdict.judgement.gap_closed is not None
     assert verdict.judgement.gap_closed > 0.9
+
+
+def test_a_verdict_prints_and_plots_itself() -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    assert "commands act late" in str(verdict)
+    assert "<img alt='The gap on recordings set aside'" in verdict._repr_html_()
+    assert verdict.plot("tried").get_axes()
+    with pytest.raises(InputError, match="picture: found 'nonsense', expected one of gap, where"):
+        verdict.plot("nonsense")
+
+
+def test_the_room_itself_gives_a_notebook_what_it_needs() -> None:
+    assert reality.discover is discover
+    assert all(getattr(reality, name) for name in reality.__all__)
+
+
+def test_a_formula_added_to_a_replay_takes_its_speed_error_away() -> None:
+    recording = recorded(EV3, 1)
+    film = Film(recording)
+    rows, _, poses, _ = film.play(EV3.physics)
+    slow = Formula("the left wheel's speed", "rad/s", ((0.5, "1"),), 0.9)
+    moved, path = with_formulas([slow])(film, rows, poses)
+    assert moved[-1, 0] - rows[-1, 0] == pytest.approx(0.5 * (film.t[-1] - film.t[0]))
+    assert np.array_equal(moved[:, 4:7], rows[:, 4:7])
+    assert path.shape == poses.shape
+
+
+def test_full_duty_that_gives_more_is_named() -> None:
+    robot = EV3.with_effects({"full_duty": {"gain": 0.03}})
+    runs = tuple(recorded(robot, seed, rig="bench", most=10) for seed in range(5))
+    assert [f.id for f in discover(Case("made", runs)).effects] == ["full_duty"]

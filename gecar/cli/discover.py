@@ -33,6 +33,11 @@ def discover(
     ] = "",
     seed: Annotated[int, typer.Option("--seed", help="Of every draw of chance.")] = 0,
     workers: Annotated[int, typer.Option("--workers", help="Threads; 0: all cores.")] = 0,
+    with_formula: Annotated[
+        bool,
+        typer.Option("--with-formula", show_default=False,
+                     help="Add a formula for what nothing explains to the replays, and show what it gains."),
+    ] = False,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
@@ -62,6 +67,7 @@ def discover(
         seed,
         workers or None,
         lambda line: voice.say(f"  {line}", style="dim"),
+        with_formula,
     )
     out.mkdir(parents=True, exist_ok=True)
     write_whole(out / "verdict.json", json.dumps(plain(verdict.as_json()), indent=1, allow_nan=False) + "\n")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -44,12 +46,20 @@ def verdict_figures(verdict: Verdict) -> dict[str, Figure]:
     verdict
         As `gecar.reality.discovery.discover` returns it.
     """
-    evidence: Evidence = verdict.evidence
-    figures = {"gap": gap_figure(verdict), "where": regimes_figure(verdict), "tried": tried_figure(verdict)}
-    figures["traces"] = traces_figure(verdict)
-    if any(len(strip.film.reel.pose_t) for strip in evidence.strips):
-        figures["map"] = map_figure(verdict)
-    return figures
+    return {name: draw(verdict) for name, draw in verdict_drawings(verdict).items()}
+
+
+def verdict_drawings(verdict: Verdict) -> dict[str, Callable[[Verdict], Figure]]:
+    """Return what draws each of a verdict's pictures, by the name of its file."""
+    drawings: dict[str, Callable[[Verdict], Figure]] = {
+        "gap": gap_figure,
+        "where": regimes_figure,
+        "traces": traces_figure,
+        "tried": tried_figure,
+    }
+    if any(len(strip.film.reel.pose_t) for strip in verdict.evidence.strips):
+        drawings["map"] = map_figure
+    return drawings
 
 
 def gap_figure(verdict: Verdict) -> Figure:

@@ -116,12 +116,17 @@ def save(figure: Figure, path: Path) -> Path:
     InputError
         If the ending is none of a picture.
     """
-    kind, stream = picture_kind(path), io.BytesIO()
+    write_whole(path, picture(figure, picture_kind(path)))
+    return path
+
+
+def picture(figure: Figure, kind: str = "png") -> bytes:
+    """Return a picture as the contents of a file of a kind."""
+    stream = io.BytesIO()
     settle(figure)
     with look():
         figure.savefig(stream, format=kind, facecolor=PAPER)
-    write_whole(path, stream.getvalue())
-    return path
+    return stream.getvalue()
 
 
 def is_whole(figure: Figure) -> bool:

@@ -59,8 +59,7 @@ class Blocks:
 
     def sums(self, values: Array) -> Array:
         """Return each block's sum of values, shape (blocks,)."""
-        out: Array = np.bincount(self._of, np.asarray(values, float), self.count)
-        return out
+        return np.bincount(self._of, values, self.count).astype(float)
 
     def colour(self, errors: Array) -> Array:
         """Return by how much slow noise exceeds white noise in each channel, shape (channels,); 1 for white.

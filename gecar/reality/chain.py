@@ -9,6 +9,7 @@ from gecar.reality.screening import ROUGH
 from gecar.reality.selection import Selection
 
 MOST_EFFECTS = 4
+MOST_ON_BENCH = 7  # a motor alone is known to tenths of a percent, and shows all its parts
 WAYS = 3  # of the first stage's effects a chain may begin with
 FAR_BEHIND = 0.3  # of the best gain: no way to begin with less
 NEARLY_STOOD = 0.75  # of the structure: a chain that explains so much is worth another beginning
@@ -124,7 +125,7 @@ def _chain(selection: Selection, first: list[Step]) -> _Way | None:
         selection.tell(f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left")
         steps.append(step)
         model = step.model
-        if len(steps) == MOST_EFFECTS or not _worth_a_look(selection, model):
+        if len(steps) == _most(selection) or not _worth_a_look(selection, model):
             break
         done = selection.steps(model)
         common = max((each.gain for each in done if each.effect == "pose_delay"), default=0.0)
@@ -133,6 +134,11 @@ def _chain(selection: Selection, first: list[Step]) -> _Way | None:
     kept = steps[: _kept(selection, steps)]
     nearly = bool(steps) and steps[0].before - steps[-1].after > NEARLY_STOOD * steps[0].before
     return _Way(tuple(kept), kept[-1].model if kept else selection.nothing, tuple(tried), nearly)
+
+
+def _most(selection: Selection) -> int:
+    bench = all(r.setup.rig == "bench" for r in selection.recordings)
+    return MOST_ON_BENCH if bench else MOST_EFFECTS
 
 
 def _worth_a_look(selection: Selection, model: Model) -> bool:

@@ -18,9 +18,10 @@ from gecar.reality.alignment import fitted_offsets
 from gecar.reality.chain import Explanation, explain
 from gecar.reality.comparison import Comparison, Strip
 from gecar.reality.confusion import alternatives
+from gecar.reality.described import with_formulas
 from gecar.reality.fitting import cost
-from gecar.reality.formula import describe
-from gecar.reality.holdout import Split, judge, split
+from gecar.reality.formula import Formula, describe
+from gecar.reality.holdout import Misfit, Split, judge, split
 from gecar.reality.known_robot import known_robot
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
@@ -29,35 +30,15 @@ from gecar.reality.recording import Case, Recording
 from gecar.reality.selection import Selection
 from gecar.reality.uncertainty import intervals
 from gecar.reality.verdict import Found, Judgement, Residual, Verdict
+from gecar.reality.visible import SIGHT, visible
 from gecar.reality.whiteness import whiteness
 from gecar.world.course import Course, load_course
-from gecar.world.effects import CATALOGUE
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
 MEMORY_S = 1.0
 POSES = (4, 5, 6)  # channels of the pose
-SIGHT = ("sensor_lag", "sensor_delay", "sensor_gain", "sensor_position", "spot_size", "line_shift")
-_MOTION = tuple(e.id for e in CATALOGUE if e.id not in SIGHT)
-# What a bench can not show: nothing touches the floor, and no camera looks.
-_FLOOR_ONLY = frozenset(
-    [
-        "wheel_radius",
-        "wheel_radius_difference",
-        "track_width",
-        "tyre_friction",
-        "slippery_patch",
-        "caster_drag",
-        "rolling_resistance",
-        "floor_tilt",
-        "load_transfer",
-        "com_offset",
-        "backlash",
-        "pose_delay",
-    ]
-)
-_TWO_MOTORS = frozenset({"motor_gain_asymmetry"})
 
 
 @dataclass(frozen=True)
@@ -111,6 +92,7 @@ def discover(
     seed: int = 0,
     workers: int | None = None,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+    with_formula: bool = False,
 ) -> Verdict:
     """Find which physics a simulation lacks, fit it, and prove it on recordings set aside.
 
@@ -128,6 +110,8 @@ def discover(
         Threads; default: all cores.
     tell
         Called with a line of progress.
+    with_formula
+        Whether to add a formula for what nothing explains to the replays, and to judge what that gains.
 
     Raises
     ------
@@ -137,7 +121,12 @@ def discover(
     shop = _open(case, holdout, robot, seed, workers, tell)
     tell(f"fitting on {', '.join(r.name for r in shop.split.fitted)}")
     motion = Selection(
-        Comparison(shop.strips, False, shop.pool), shop.robot, _seen(shop), shop.split.fitted, seed, tell
+        Comparison(shop.strips, False, shop.pool),
+        shop.robot,
+        visible(shop.strips),
+        shop.split.fitted,
+        seed,
+        tell,
     )
     moved = explain(motion)
     colour = motion.blocks.colour(motion.rid_of_subtle(moved.taken).fit.errors)[list(POSES)]
@@ -160,18 +149,20 @@ def discover(
         else ("missing" if found else "nothing")
     )
     white, p = whiteness(motion, moved.taken)
-    formula = (
-        describe(shop.strips, shop.held, moved.taken.freedom.physics(moved.taken.fit.z))
-        if moved.unexplained
-        else None
-    )
+    physics = moved.taken.freedom.physics(moved.taken.fit.z)
+    formulas = describe(shop.strips, shop.held, physics) if moved.unexplained else ()
     return Verdict(
         case=case.name,
         verdict=verdict,
         effects=found,
         located=located,
         judgement=judgement,
-        residual=Residual(white and not unexplained, p, str(formula) if formula is not None else None),
+        residual=Residual(
+            white and not unexplained,
+            p,
+            "; ".join(map(str, formulas)) or None,
+            _described(shop, found_robot, formulas) if with_formula and formulas else None,
+        ),
         next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
@@ -215,22 +206,6 @@ def _open(
     )
 
 
-def _seen(shop: _Workshop) -> tuple[str, ...]:
-    """Return the effects of motion these recordings can show at all."""
-    fitted = shop.split.fitted
-    hidden: set[str] = set()
-    if all(r.setup.rig == "bench" for r in fitted):
-        hidden |= _FLOOR_ONLY
-    if all(np.isnan(r.left_duty).all() or np.isnan(r.right_duty).all() for r in fitted):
-        hidden |= _TWO_MOTORS
-    duties = np.concatenate([r.commands.ravel() for r in fitted])
-    if duties.min() >= 0.0 or duties.max() <= 0.0:
-        hidden |= {"friction_asymmetry"}
-    if not any(len(s.film.reel.pose_t) for s in shop.strips):
-        hidden |= {"pose_delay", "slippery_patch"}
-    return tuple(e for e in _MOTION if e not in hidden)
-
-
 def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection | None, Explanation | None]:
     """Explain what the colour sensor saw along the measured path."""
     comparison = Comparison(shop.strips, True, shop.pool)
@@ -249,6 +224,13 @@ def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
     sight.set_path(found.physics, colour)
     channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
     return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
+
+
+def _described(shop: _Workshop, found: Robot, formulas: Sequence[Formula]) -> dict[str, Misfit]:
+    """Judge what formulas added to the robot found gain on the recordings set aside."""
+    change = with_formulas(formulas)
+    misfits = judge(shop.split.held, shop.held, shop.noise, found, found, change)
+    return {column: m for column, m in misfits.items() if m.before != m.after}
 
 
 def _set_clocks(shop: _Workshop, found: Robot) -> None:

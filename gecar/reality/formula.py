@@ -93,26 +93,28 @@ class _Signal:
         return float(np.sum(self.residual**2))
 
 
-_TARGETS = (
+TARGETS = (
     ("the left wheel's speed", "rad/s"), ("the right wheel's speed", "rad/s"),
     ("the speed ahead", "m/s"), ("the speed to the left", "m/s"), ("the turning rate", "rad/s"),
 )  # fmt: skip
 
 
-def describe(fitted: Sequence[Strip], held: Sequence[Strip], physics: npt.NDArray[Any]) -> Formula | None:
-    """Return the formula that best describes what a model leaves; None if none holds on recordings set aside.
+def describe(
+    fitted: Sequence[Strip], held: Sequence[Strip], physics: npt.NDArray[Any]
+) -> tuple[Formula, ...]:
+    """Return formulas that describe what a model leaves, the most telling first; none if none holds on hold-out.
 
     Parameters
     ----------
     fitted, held
-        Recordings to find it on, and to judge it by.
+        Recordings to find them on, and to judge them by.
     physics
         Record of the model, shape (1,).
     """
     found = []
     tables = [_signals(strip, physics) for strip in fitted]
     proofs = [_signals(strip, physics) for strip in held]
-    for number, (target, unit) in enumerate(_TARGETS):
+    for number, (target, unit) in enumerate(TARGETS):
         signals = [table[number] for table in tables if len(table[number].residual)]
         judges = [table[number] for table in proofs if len(table[number].residual)]
         if signals and judges:
@@ -120,7 +122,7 @@ def describe(fitted: Sequence[Strip], held: Sequence[Strip], physics: npt.NDArra
             if formula is not None:
                 loudness = sum(s.energy for s in judges)
                 found.append((formula.share * loudness, formula))
-    return max(found, key=lambda pair: pair[0])[1] if found else None
+    return tuple(formula for _, formula in sorted(found, key=lambda pair: -pair[0]))
 
 
 def _sparse(target: str, unit: str, signals: list[_Signal], judges: list[_Signal]) -> Formula | None:
@@ -185,7 +187,7 @@ def _signals(strip: Strip, physics: npt.NDArray[Any]) -> list[_Signal]:
     """Return a recording's residuals by target, with the terms filtered alike."""
     film = strip.film
     rows, row_errors, poses, _ = film.play(physics)
-    terms = _terms(rows, film.t, strip.recording.commands)
+    terms = state_terms(rows, film.t, strip.recording.commands)
     sd, walk, memory = film.reel.sd, film.reel.walk, film.reel.memory
     out = [_signal(film.t, terms, film.t, row_errors[:, k] * sd[0], sd[0], memory) for k in (0, 1)]
     pose_t, raw = film.reel.pose_t, film.reel.pose - poses
@@ -221,7 +223,7 @@ NAMES = (
 """Terms: v [m/s] ahead, omega [rad/s], w_left and w_right the shafts' speeds [rad/s], angles [rad], x, y [m], t [s]."""
 
 
-def _terms(rows: Array, t: Array, commands: Array) -> Array:
+def state_terms(rows: Array, t: Array, commands: Array) -> Array:
     """Return every term at every row, shape (rows, terms)."""
     v, omega = rows[:, AHEAD], rows[:, YAW_RATE]
     left, right = rows[:, LEFT_ANGLE], rows[:, RIGHT_ANGLE]

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gecar.errors import expected
 from gecar.reality.columns import COLUMNS
 from gecar.reality.comparison import Strip
+from gecar.reality.described import Change
 from gecar.reality.noise import Noise
 from gecar.reality.recording import Case, Recording
 from gecar.reality.replay import Film
@@ -94,7 +95,12 @@ class Misfit:
 
 
 def judge(
-    held: Sequence[Recording], strips: Sequence[Strip], noise: Noise, before: Robot, after: Robot
+    held: Sequence[Recording],
+    strips: Sequence[Strip],
+    noise: Noise,
+    before: Robot,
+    after: Robot,
+    change: Change | None = None,
 ) -> dict[str, Misfit]:
     """Compare two robots on recordings neither was fitted to, whole and open loop, by column of the file.
 
@@ -106,11 +112,16 @@ def judge(
         Gives the floor.
     before, after
         The robots.
+    change
+        What is made of the second one's replays: a formula added, for instance.
     """
     errors: dict[str, list[Array]] = {}
     spread: dict[str, list[Array]] = {}
     for recording, strip in zip(held, strips, strict=True):
-        both = [_errors(recording, strip, noise, robot) for robot in (before, after)]
+        both = [
+            _errors(recording, strip, noise, before, None),
+            _errors(recording, strip, noise, after, change),
+        ]
         for field, _ in _FIELDS:
             values = getattr(recording, field)
             if not np.isnan(values).all() and field in both[0]:
@@ -129,10 +140,14 @@ def judge(
     return out
 
 
-def _errors(recording: Recording, strip: Strip, noise: Noise, robot: Robot) -> dict[str, Array]:
+def _errors(
+    recording: Recording, strip: Strip, noise: Noise, robot: Robot, change: Change | None
+) -> dict[str, Array]:
     film = Film(recording, noise.sd, offset_s=strip.film.offset_s)
     physics = robot.physics
     rows, _, poses, _ = film.play(physics, film.aligned_start(physics))
+    if change is not None:
+        rows, poses = change(film, rows, poses)
     out = {f: getattr(recording, f) - rows[:, k] for f, k in _ROW.items()}
     for field, k in _POSE.items():
         out[field] = film.reel.pose[:, k] - poses[:, k]

@@ -15,14 +15,15 @@ from gecar.reality.model import Model, Step
 Array = npt.NDArray[np.float64]
 
 NULLS = 500
+TOLD = 0.02  # of what all recordings tell of a parameter
 
 
 def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
     """Judge a step by leaving out recordings, and against the null."""
     new = step.model
-    left_out = _left_out(fits, new) if len(np.unique(fits.blocks.folds)) > 1 else None
-    before = np.bincount(fits.blocks.folds, costs(step.base.fit.errors))
-    gains = before - left_out if left_out is not None else np.array([step.gain])
+    several = len(np.unique(fits.blocks.folds)) > 1
+    # The model below is asked to predict, too: what it fitted to the left-out recording would flatter it.
+    gains = _left_out(fits, step.base) - _left_out(fits, new) if several else np.array([step.gain])
     nulls = null(fits, catalogue, new)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)
@@ -31,15 +32,22 @@ def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
 def _left_out(fits: Fits, model: Model) -> Array:
     """Return each fold's cost under parameters fitted without it (one Newton step back), shape (folds,)."""
     slopes, errors, z = fits.slopes(model), model.fit.errors, model.fit.z
+    if not len(z):
+        return np.bincount(fits.blocks.folds, costs(errors)).astype(float)
     w = weights(errors)
     out = np.zeros(int(fits.blocks.folds.max()) + 1)
     normal = slopes.T @ (w[:, None] * slopes)
-    ridge = 1e-6 * np.diag(np.maximum(np.diag(normal), 1e-9))
     for k in np.unique(fits.blocks.folds):
         rows = fits.blocks.folds == k
-        part = slopes[rows].T @ (w[rows, None] * slopes[rows])
+        rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * errors[rows])
-        without = np.clip(z + np.linalg.solve(normal - part + ridge, pull), *model.freedom.bounds)
+        # What this recording alone tells is not known without it: it stays neutral.
+        known = np.flatnonzero(np.diag(rest) > TOLD * np.diag(normal))
+        without = np.zeros(len(z))
+        block = rest[np.ix_(known, known)]
+        ridge = 1e-6 * np.diag(np.maximum(np.diag(block), 1e-9))
+        without[known] = z[known] + np.linalg.solve(block + ridge, pull[known])
+        without = np.clip(without, *model.freedom.bounds)
         out[k] = float(np.sum(costs(fits.residual(model.freedom, model.shift)(without)[rows])))
     return out
 

@@ -134,6 +134,7 @@ _SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = 
     "line_shift": _line,
     "sensor_position": _mount,
     "backlash": lambda robot, recordings: _positive(("angle_deg", (2.0, 5.0, 10.0))),  # noqa: ARG005
+    "start_latency": lambda robot, recordings: _positive(("time_s", (0.02, 0.05))),  # noqa: ARG005
     "actuation_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.03, 0.08))),  # noqa: ARG005
     "tyre_friction": lambda robot, recordings: _positive(("coefficient", (0.6, 0.35, 0.15, 1.2))),  # noqa: ARG005
     "sensor_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.04, 0.1))),  # noqa: ARG005

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
+from gecar.errors import expected
 from gecar.reality.holdout import Misfit
 from gecar.world.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
@@ -113,11 +118,22 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left: whether it is white, how likely that is by chance, and a formula that describes it."""
+    """What is left.
+
+    Attributes
+    ----------
+    white, p
+        Whether it is white, and how likely that is by chance.
+    formula
+        What describes it, the most telling first.
+    described
+        If asked for: NRMSE on the recordings set aside of the robot found, without and with the formulas added.
+    """
 
     white: bool
     p: float
     formula: str | None = None
+    described: Mapping[str, Misfit] | None = None
 
 
 @dataclass(frozen=True)
@@ -130,7 +146,7 @@ class NextRecording:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What `gecar.reality.discovery.discover` found; print it, or plot it with `gecar.plots.discovery`."""
+    """What `gecar.reality.discovery.discover` found: `print` it, `plot` it, or let a notebook show it."""
 
     case: str
     verdict: str
@@ -143,6 +159,29 @@ class Verdict:
     fitted_on: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     evidence: Any = field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        """Return the verdict in words."""
+        return "\n\n".join(_above("report.verdict").sentences(self))
+
+    def _repr_html_(self) -> str:
+        """Return the verdict as a notebook shows it: words, tables, and how much of the gap is closed."""
+        png = _above("plots.style").picture(self.plot())
+        return str(_above("report.verdict_page").verdict_html(self, {"gap": png}))
+
+    def plot(self, picture: str = "gap") -> Figure:
+        """Draw one of the verdict's pictures: ``gap``, ``where``, ``tried``, ``traces`` or, with poses, ``map``.
+
+        Raises
+        ------
+        InputError
+            If there is no such picture.
+        """
+        drawings = _above("plots.discovery").verdict_drawings(self)
+        if picture not in drawings:
+            raise expected("picture", f"'{picture}'", f"one of {', '.join(drawings)}")
+        figure: Figure = drawings[picture](self)
+        return figure
 
     def as_json(self) -> dict[str, Any]:
         """Return the contents of ``verdict.json``."""
@@ -159,7 +198,7 @@ class Verdict:
                 "floor": judged.floor,
                 "gap_closed": None if self.verdict == "nothing" else judged.gap_closed,
             },
-            "residual": vars(self.residual),
+            "residual": _residual_json(self.residual),
             "next_recording": {
                 "why": self.next_recording.why,
                 "commands": [list(row) for row in self.next_recording.commands],
@@ -174,6 +213,18 @@ def _effect_json(found: Found) -> dict[str, Any]:
         "parameters": {label: vars(interval) for label, interval in found.parameters.items()},
         "evidence": {"holdout_gain": found.holdout_gain, "null_95": found.null_95, "p": found.p},
     }
+
+
+def _above(module: str) -> Any:
+    """Return a module of the rooms that make words and pictures: no import, for this room must not need them."""
+    return import_module(f"gecar.{module}")
+
+
+def _residual_json(residual: Residual) -> dict[str, Any]:
+    table: dict[str, Any] = {"white": residual.white, "p": residual.p, "formula": residual.formula}
+    if residual.described is not None:
+        table["with_formula"] = {c: vars(m) for c, m in residual.described.items()}
+    return table
 
 
 def _place_json(place: Place) -> dict[str, Any]:

@@ -79,7 +79,12 @@ def _unexplained(verdict: Verdict) -> str:
     if shown is not None:
         words += f" It shows most in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
     if verdict.residual.formula:
-        words += f" {verdict.residual.formula} describes it: a description, not a cause."
+        words += f" This describes it, and is no cause: {verdict.residual.formula}."
+    if verdict.residual.described:
+        gains = ", ".join(
+            f"{c} {m.before:.4f} to {m.after:.4f}" for c, m in verdict.residual.described.items()
+        )
+        words += f" Added to the replays, it brings the NRMSE on what was set aside from {gains}."
     return words
 
 

@@ -32,17 +32,25 @@ def verdict_page(verdict: Verdict, pictures: Mapping[str, bytes]) -> str:
     pictures
         PNG files by name.
     """
-    first, *rest = sentences(verdict)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         f"<meta name='viewport' content='width=device-width'><title>{_text(verdict.case)}</title>",
-        f"<style>{_STYLE}</style></head><body><h1>{_text(verdict.case)}: {_text(first)}</h1>",
+        f"<style>{_STYLE}</style></head><body>{verdict_html(verdict, pictures)}</body></html>\n",
+    ]
+    return "\n".join(parts)
+
+
+def verdict_html(verdict: Verdict, pictures: Mapping[str, bytes]) -> str:
+    """Return what stands on a verdict's page, for a page of one's own; parameters as `verdict_page` has them."""
+    first, *rest = sentences(verdict)
+    parts = [
+        f"<h1>{_text(verdict.case)}: {_text(first)}</h1>",
         *(f"<p>{_text(line)}</p>" for line in rest),
         _effects(verdict),
         _channels(verdict),
         _places(verdict),
         *(_picture(name, png) for name, png in pictures.items()),
-        f"<p>Fitted on {_text(', '.join(verdict.fitted_on))}.</p></body></html>\n",
+        f"<p>Fitted on {_text(', '.join(verdict.fitted_on))}.</p>",
     ]
     return "\n".join(parts)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gecar.compiled import compiled
-from gecar.world.motor import bare_shaft, effective_duty, motor_current, regulate, slewed, supply
+from gecar.world.motor import awake, bare_shaft, effective_duty, motor_current, regulate, slewed, supply
 
 
 @compiled
@@ -25,8 +25,8 @@ def bench_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> N
     if p.regulated != 0.0:
         left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-    s.left_duty = slewed(left_duty, s.left_duty, c)
-    s.right_duty = slewed(right_duty, s.right_duty, c)
+    s.left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+    s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
     s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
     s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
     s.left_speed = bare_shaft(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c)

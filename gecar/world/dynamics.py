@@ -19,6 +19,7 @@ from typing import Any
 
 from gecar.compiled import compiled
 from gecar.world.motor import (
+    awake,
     conduct,
     effective_duty,
     friction_budget,
@@ -100,8 +101,8 @@ def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> 
     if p.regulated != 0.0:
         left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-    s.left_duty = slewed(left_duty, s.left_duty, c)
-    s.right_duty = slewed(right_duty, s.right_duty, c)
+    s.left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+    s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
     s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
     s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
     s.left_speed = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c)

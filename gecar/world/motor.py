@@ -11,6 +11,9 @@ from gecar.compiled import compiled
 FULL_SPEED = math.radians(1000.0)
 
 
+FULL_DUTY = 0.999  # from here on a bridge no longer switches
+
+
 @compiled
 def conduct(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
     """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
@@ -27,12 +30,22 @@ def conduct(duty: float, voltage: float, angle: float, speed: float, p: Any, c: 
 
 
 @compiled
+def awake(duty: float, t: float, p: Any, c: Any) -> float:
+    """Return a duty as motors that first answer some time after the start get it; t is the step's start [s]."""
+    if p.start_latency > 0.0:
+        return duty * min(max((t + 0.5 * c.dt - p.start_latency) / c.dt, 0.0), 1.0)
+    return duty
+
+
+@compiled
 def effective_duty(duty: float, gain: float, p: Any) -> float:
-    """Return the share of the supply that reaches a motor: dead band, then gain by side and direction."""
+    """Return the share of the supply that reaches a motor: dead band, gain by side and direction, full duty's own."""
     if abs(duty) < p.dead_band:
         return 0.0
     past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
     direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
+    if abs(duty) >= FULL_DUTY:
+        past *= 1.0 + p.full_duty_gain
     return past * gain * direction
 
 
