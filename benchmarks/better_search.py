@@ -10,22 +10,17 @@ The preset's settings were chosen with seeds from 1001 up, never with these.
 from __future__ import annotations
 
 from argparse import ArgumentParser
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from rich.console import Console
-from rich.progress import Progress
 
+from benchmarks.studies import number, performed, piped, planned
 from gecar.files import write_whole
-from gecar.results.cells import Cell, cells_of
-from gecar.results.config import configure
-from gecar.results.performing import Workplace, perform_all
+from gecar.results.cells import Cell
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
-from gecar.results.study import Planned, StudyFolder
-from gecar.search.executors import usable_cores
 from gecar.search.settings import PRESETS
 from gecar.world.course import list_courses
 
@@ -69,30 +64,6 @@ def searches() -> dict[str, dict[str, Any]]:
     }
 
 
-def planned(
-    courses: Sequence[str], chosen: Mapping[str, Mapping[str, Any]], seeds: int, grammar: str
-) -> list[Planned]:
-    """Return all runs, seed after seed."""
-    return [
-        Planned(course, name, configure({**fields, "course": course, "grammar": grammar, "seed": seed}))
-        for seed in range(1, seeds + 1)
-        for course in courses
-        for name, fields in chosen.items()
-    ]
-
-
-def performed(runs: Sequence[Planned], out: Path) -> list[Cell]:
-    """Perform what is not kept in the folder yet; return the cells."""
-    folder = StudyFolder(out)
-    folder.runs.mkdir(parents=True, exist_ok=True)
-    left = [run for run in runs if folder.load(run) is None]
-    with Progress(console=Console(stderr=True)) as bar:
-        task = bar.add_task("runs", total=len(runs), completed=len(runs) - len(left))
-        place = Workplace.of("process", usable_cores())
-        perform_all(left, folder, place, lambda _: bar.advance(task))
-    return cells_of(runs, [folder.load(run) for run in runs])
-
-
 def ablation_table(cells: Sequence[Cell]) -> str:
     """Write the searches beside each other, against the better one."""
     better, *others = cells
@@ -102,7 +73,7 @@ def ablation_table(cells: Sequence[Cell]) -> str:
     for cell, test, p in zip(others, tests, corrected, strict=True):
         lines.append([cell.column, *_figures(cell), f"{test.a12:.2f}", f"{p:.2g}"])
     heads = ["search", "at GOAL", "median [s] (95 %)", "worst [s]", "evaluations to 16.74 s", "A12", "p"]
-    return _piped([heads, *lines])
+    return piped([heads, *lines])
 
 
 def courses_table(cells: Sequence[Cell]) -> str:
@@ -116,7 +87,7 @@ def courses_table(cells: Sequence[Cell]) -> str:
         lines.append(
             [str(better.row), *_figures(better)[:3], *_figures(paper)[:3], f"{test.a12:.2f}", f"{p:.2g}"]
         )
-    return _piped(lines)
+    return piped(lines)
 
 
 def _figures(cell: Cell) -> list[str]:
@@ -124,8 +95,8 @@ def _figures(cell: Cell) -> list[str]:
     times = cell.times_s
     return [
         f"{cell.solved}/{len(times)}",
-        f"{_number(cell.quantile_s(0.5))} ({_number(low)} to {_number(high)})",
-        _number(float(times.max())),
+        f"{number(cell.quantile_s(0.5))} ({number(low)} to {number(high)})",
+        number(float(times.max())),
         _count(evaluations_to(cell, PAPERS_BEST_S)),
     ]
 
@@ -133,15 +104,6 @@ def _figures(cell: Cell) -> list[str]:
 def _count(spent: npt.NDArray[np.float64]) -> str:
     median = float(np.quantile(spent, 0.5, method="higher"))
     return f"{median:,.0f}" if np.isfinite(median) else "-"
-
-
-def _number(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "-"
-
-
-def _piped(lines: Sequence[Sequence[str]]) -> str:
-    head, *rest = (f"| {' | '.join(line)} |" for line in lines)
-    return "\n".join([head, "|---" * len(lines[0]) + "|", *rest]) + "\n"
 
 
 def main() -> None:

@@ -1,0 +1,52 @@
+"""Studies that benchmarks share: runs kept in a folder, gone on with where they were stopped, and tables of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from gecar.results.cells import Cell, cells_of
+from gecar.results.config import configure
+from gecar.results.performing import Workplace, perform_all
+from gecar.results.study import Planned, StudyFolder
+from gecar.search.executors import usable_cores
+
+
+def planned(
+    courses: Sequence[str], chosen: Mapping[str, Mapping[str, Any]], seeds: int, grammar: str
+) -> list[Planned]:
+    """Return all runs, seed after seed."""
+    return [
+        Planned(course, name, configure({**fields, "course": course, "grammar": grammar, "seed": seed}))
+        for seed in range(1, seeds + 1)
+        for course in courses
+        for name, fields in chosen.items()
+    ]
+
+
+def performed(runs: Sequence[Planned], out: Path) -> list[Cell]:
+    """Perform what is not kept in the folder yet; return the cells."""
+    folder = StudyFolder(out)
+    folder.runs.mkdir(parents=True, exist_ok=True)
+    left = [run for run in runs if folder.load(run) is None]
+    with Progress(console=Console(stderr=True)) as bar:
+        task = bar.add_task("runs", total=len(runs), completed=len(runs) - len(left))
+        place = Workplace.of("process", usable_cores())
+        perform_all(left, folder, place, lambda _: bar.advance(task))
+    return cells_of(runs, [folder.load(run) for run in runs])
+
+
+def number(value: float) -> str:
+    """Write a time [s]; a dash where there is none."""
+    return f"{value:.2f}" if np.isfinite(value) else "-"
+
+
+def piped(lines: Sequence[Sequence[str]]) -> str:
+    """Write lines of words as a Markdown table, the first as its head."""
+    head, *rest = (f"| {' | '.join(line)} |" for line in lines)
+    return "\n".join([head, "|---" * len(lines[0]) + "|", *rest]) + "\n"
