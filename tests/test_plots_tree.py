@@ -13,7 +13,7 @@ DIGITS = Mapper(parse_grammar("<s> ::= motor(<n>, <n>)\n<n> ::= <d> | <d><n>\n<d
 
 
 def words(figure):
-    return [text.get_text() for text in figure.axes[0].texts]
+    return [text.get_text().strip() for text in figure.axes[0].texts]
 
 
 def leaves(mapper, codons):

@@ -8,20 +8,26 @@ from typing import Any
 
 from gecar.cli.voice import Voice
 from gecar.cli.worlds import build_world, drive_seed, find_program, read_run_config
+from gecar.errors import expected
 from gecar.language.program import read_program
 from gecar.plots.classroom import write_classroom_page
 from gecar.plots.compare_runs import compare_runs
 from gecar.plots.convergence import Reference, convergence
+from gecar.plots.evolution_film import Champion, film_evolution
+from gecar.plots.genealogy import genealogy
 from gecar.plots.style import save
 from gecar.plots.trajectory import trajectory
+from gecar.plots.tree import tree_of
 from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
 from gecar.report.run import run_detail, run_title
 from gecar.report.runs import group_names, summaries, summary_table
+from gecar.results.ancestry import Ancestry, read_ancestry
 from gecar.results.config import Config
 from gecar.results.folder import read_history, read_result
+from gecar.results.running import load_task
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
-from gecar.world.rollout import simulate
+from gecar.world.rollout import World, simulate
 
 
 def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
@@ -52,6 +58,18 @@ def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
     return drawn
 
 
+def study_run(folder: Path, out: Path | None = None) -> list[Path]:
+    """Draw all of a run's pictures: those of `draw_run`, its best program's derivation, and who that descends from."""
+    target = out or folder
+    drawn = draw_run(folder, target)
+    if read_result(folder)["program"]:
+        drawn += [
+            draw_tree(folder, target / "tree.png"),
+            draw_genealogy(folder, target / "genealogy.png"),
+        ]
+    return drawn
+
+
 def draw_convergence(folder: Path, target: Path) -> Path:
     """Draw a run's convergence."""
     config, history, result = read_run_config(folder), read_history(folder), read_result(folder)
@@ -66,6 +84,58 @@ def draw_trajectory(folder: Path, target: Path) -> Path:
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
     title, detail = title_of(drive, world.course), detail_of(world, drive)
     return save(trajectory(world, program, drive, title=title, detail=detail), target)
+
+
+def draw_tree(folder: Path, target: Path) -> Path:
+    """Draw the derivation of a run's best program.
+
+    Raises
+    ------
+    InputError
+        If the folder is no run's, or its run found no program.
+    """
+    mapper = load_task(read_run_config(folder)).mapper
+    return save(tree_of(mapper, read_result(folder)["genome"]), target)
+
+
+def draw_genealogy(folder: Path, target: Path) -> Path:
+    """Draw who a run's best program descends from; see `gecar.results.ancestry.read_ancestry`."""
+    ancestry, config, result = read_ancestry(folder), read_run_config(folder), read_result(folder)
+    line, family = ancestry.lineage.line(ancestry.winner), ancestry.lineage.family(ancestry.winner)
+    detail = (
+        f"found in generation {ancestry.winner[0]} · {sum(map(len, family)) - 1:,} ancestors whose codons are in it, "
+        f"{len(line) - 1} of them in its own line · {run_detail(config, result)}"
+    )
+    figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, run_title(config, result), detail)
+    return save(figure, target)
+
+
+def film_run(folder: Path, target: Path) -> Path:
+    """Film the best program of each generation of a run that brought a better one.
+
+    Raises
+    ------
+    InputError
+        If the target's ending is no film's, no program was found, or as `gecar.results.ancestry.read_ancestry`.
+    """
+    ancestry, (_, settings) = read_ancestry(folder), find_program(folder)
+    world = build_world(settings)
+    champions = _champions(ancestry, world, settings)
+    if not champions:
+        raise expected(folder, "a run that found no program", "one that did")
+    return film_evolution(world, champions, read_history(folder), target)
+
+
+def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
+    """Drive the best program of each generation that brought a better one, as the run scored it."""
+    champions = []
+    for member in ancestry.lineage.champions():
+        program = ancestry.program(member)
+        if program is not None:
+            drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+            title = f"Generation {member[0]} · {title_of(drive, world.course)}"
+            champions.append(Champion(member[0], program, drive, title))
+    return champions
 
 
 def write_drive_page(folder: Path, target: Path) -> Path:

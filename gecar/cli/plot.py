@@ -1,9 +1,9 @@
-"""``gecar plot``: a run's pictures again, or runs beside each other."""
+"""``gecar plot``: a run's pictures again, what its evolution was like, or runs beside each other."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,6 +15,10 @@ RunsArgument = Annotated[
 ]
 
 
+def _file(option: str, words: str) -> Any:
+    return typer.Option(option, metavar="FILE", help=words, show_default=False)
+
+
 def plot(
     runs: RunsArgument,
     out: Annotated[
@@ -22,6 +26,16 @@ def plot(
         typer.Option(
             "--out", metavar="FOLDER", help="Where the pictures go.", show_default="the run, or here"
         ),
+    ] = None,
+    tree: Annotated[
+        Path | None,
+        _file("--tree", "Draw only what is named: the best program's derivation; .png, .pdf or .svg."),
+    ] = None,
+    genealogy: Annotated[
+        Path | None, _file("--genealogy", "... who it descends from; .png, .pdf or .svg.")
+    ] = None,
+    evolution: Annotated[
+        Path | None, _file("--evolution", "... a film of how the best one got better; .gif or .mp4.")
     ] = None,
     page: Annotated[
         bool,
@@ -31,29 +45,66 @@ def plot(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a run's pictures again, or several runs beside each other.
+    """Draw a run's pictures, or several runs beside each other.
 
-    Runs that differ in their seed only are drawn together, as median and middle half.
+    Of one run: convergence, the best program's drive, its derivation, and its genealogy. Runs that differ in their
+    seed only are drawn together, as median and middle half.
 
     [bold]Examples[/]
 
       gecar plot runs/evolve-001
       gecar plot runs/evolve-001 --html
+      gecar plot runs/evolve-001 --evolution evolution.gif
       gecar plot runs/paper-*  --out figures
     """
-    from gecar.cli.pictures import compare, draw_run, write_drive_page
-
     voice = Voice(as_json)
-    if page and len(runs) > 1:
-        raise expected("--html", f"{len(runs)} runs", "one")
-    if len(runs) == 1:
-        drawn = draw_run(runs[0], out)
-        pages = [write_drive_page(runs[0], (out or runs[0]) / "drive.html")] if page else []
-        voice.answer({"pictures": [str(path) for path in drawn], "pages": [str(path) for path in pages]})
-        for path in pages:
-            voice.say(f"Page: {path}")
+    named = {"--tree": tree, "--genealogy": genealogy, "--evolution": evolution}
+    if len(runs) > 1:
+        _compare(voice, runs, out or Path(), {**named, "--html": page})
     else:
-        table, drawn = compare(voice, runs, out or Path())
-        voice.answer({"groups": table, "pictures": [str(path) for path in drawn]})
+        _study(voice, runs[0], out or runs[0], named, page)
+
+
+def _compare(voice: Voice, runs: list[Path], out: Path, of_one: dict[str, Any]) -> None:
+    """Draw runs beside each other."""
+    from gecar.cli.pictures import compare
+
+    for option, given in of_one.items():
+        if given:
+            raise expected(option, f"{len(runs)} runs", "one")
+    table, drawn = compare(voice, runs, out)
+    voice.answer({"groups": table, "pictures": [str(path) for path in drawn]})
     for path in drawn:
         voice.say(f"Picture: {path}")
+
+
+def _study(voice: Voice, run: Path, out: Path, named: dict[str, Path | None], page: bool) -> None:
+    """Draw what is named of a run, or everything."""
+    from gecar.cli.pictures import draw_genealogy, draw_tree, film_run, study_run, write_drive_page
+
+    tree, genealogy, evolution = named.values()
+    _check_endings(tree, genealogy, evolution)
+    made: dict[str, list[Path]] = {"pictures": [], "films": [], "pages": []}
+    if not any(named.values()):
+        made["pictures"] += study_run(run, out)
+    made["pages"] += [write_drive_page(run, out / "drive.html")] if page else []
+    made["pictures"] += [draw_tree(run, tree)] if tree else []
+    made["pictures"] += [draw_genealogy(run, genealogy)] if genealogy else []
+    made["films"] += [film_run(run, evolution)] if evolution else []
+    voice.answer({kind: [str(path) for path in paths] for kind, paths in made.items()})
+    for kind, paths in made.items():
+        for path in paths:
+            voice.say(f"{kind.capitalize().removesuffix('s')}: {path}")
+
+
+def _check_endings(tree: Path | None, genealogy: Path | None, evolution: Path | None) -> None:
+    """Refuse what can not be drawn before anything is."""
+    from gecar.plots.animation import check_film
+    from gecar.plots.style import picture_kind
+
+    for picture in filter(None, (tree, genealogy)):
+        picture_kind(picture)
+        picture.parent.mkdir(parents=True, exist_ok=True)
+    if evolution:
+        check_film(evolution, option="--evolution")
+        evolution.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A drive as a film: GIF, or MP4 where ffmpeg is installed.
+"""Drives as a film: GIF, or MP4 where ffmpeg is installed.
 
 Only what moves is drawn anew for each frame; the rest is kept as an image. A frame then takes about 30 ms.
 """
@@ -9,7 +9,8 @@ import io
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,8 @@ from gecar.plots.trajectory import choose
 from gecar.world.rollout import TRACE_S, Drive, World
 
 FRAMES_PER_S = 20
-LAST_FRAME_MS = 2000
+LAST_FRAME_S, BETWEEN_S = 2.0, 1.0
+"""How long the last frame stays, and that of each drive before another [s]."""
 WIDTH_IN, DPI = 9.0, 100
 
 Frame = npt.NDArray[np.uint8]
@@ -61,25 +63,59 @@ def film(
         If the ending is another, or an MP4 is wanted where there is no ffmpeg.
     """
     check_film(path, pace)
-    frames = _Scene(world, program, drive, title).frames(pace)
-    write_whole(path, _gif(frames) if path.suffix.lower() == ".gif" else _mp4(frames))
+    return _write(_held(Scene(world, program, drive, title).frames(pace), LAST_FRAME_S), path)
+
+
+def film_of(scenes: Sequence[Callable[[], Scene]], path: Path, *, pace: float) -> Path:
+    """Film drives one after the other.
+
+    Parameters
+    ----------
+    scenes
+        Each made when its turn comes, on the same course.
+    path, pace
+        As in `film`.
+
+    Raises
+    ------
+    InputError
+        As in `film`.
+    """
+    check_film(path, pace)
+    *_, last = scenes[-1]().frames(pace)
+    films = [_held(scene().frames(pace), BETWEEN_S) for scene in scenes[:-1]]
+    frames = chain(*films, _held(scenes[-1]().frames(pace), LAST_FRAME_S))
+    return _write(frames, path, _palette(Image.fromarray(last)))
+
+
+def _held(frames: Iterator[Frame], seconds: float) -> Iterator[Frame]:
+    """Yield frames, and the last one for as long as it is to stay [s]."""
+    frame = next(frames)
+    yield frame
+    for frame in frames:
+        yield frame
+    yield from repeat(frame, round(seconds * FRAMES_PER_S))
+
+
+def _write(frames: Iterator[Frame], path: Path, palette: Image.Image | None = None) -> Path:
+    write_whole(path, _gif(frames, palette) if path.suffix.lower() == ".gif" else _mp4(frames))
     return path
 
 
-def check_film(path: Path, pace: float) -> None:
+def check_film(path: Path, pace: float = 1.0, option: str = "--animate") -> None:
     """Check that a film can be made; see `film`."""
     kind = path.suffix.lower()
     if kind not in (".gif", ".mp4"):
-        raise expected("--animate", f"'{path.name}'", "a name that ends in .gif or .mp4")
+        raise expected(option, f"'{path.name}'", "a name that ends in .gif or .mp4")
     if not 0.1 <= pace <= 100.0:
         raise expected("--pace", pace, "0.1 to 100")
     if kind == ".mp4" and shutil.which("ffmpeg") is None:
         raise expected(
-            "--animate", f"'{path.name}' but no ffmpeg on this machine", "ffmpeg, or a name that ends in .gif"
+            option, f"'{path.name}' but no ffmpeg on this machine", "ffmpeg, or a name that ends in .gif"
         )
 
 
-class _Scene:
+class Scene:
     """What a film shows, and the parts that move."""
 
     def __init__(self, world: World, program: Program, drive: Drive, title: str) -> None:
@@ -95,21 +131,22 @@ class _Scene:
             grid = self.figure.add_gridspec(2, 2, height_ratios=(height, 1.0), width_ratios=(0.74, 0.26))
             self.floor = self.figure.add_subplot(grid[0, 0])
             self.obstacles = draw_floor(self.floor, course)
-            self.sensor = self.figure.add_subplot(grid[1, :])
-            self._draw_sensor()
+            self.below = self.figure.add_subplot(grid[1, :])
+            self._draw_below()
             self.listing = Listing(self.figure.add_subplot(grid[0, 1]), program.source, self.colouring.lines)
             self.robot = RobotArtist(self.floor, shape_of(world.robot))
-            self.clock = self.sensor.text(
-                0.995, 1.08, "", transform=self.sensor.transAxes, ha="right", weight="bold", color=INK
+            self.clock = self.below.text(
+                0.995, 1.08, "", transform=self.below.transAxes, ha="right", weight="bold", color=INK
             )
 
-    def _draw_sensor(self) -> None:
+    def _draw_below(self) -> None:
+        """Draw what stands below the course: what the sensor sees."""
         t = self.trace["t_s"]
-        self.sensor.plot(t, self.trace["reflection_pct"], color=SOFT, linewidth=0.9)
-        self.sensor.set(
+        self.below.plot(t, self.trace["reflection_pct"], color=SOFT, linewidth=0.9)
+        self.below.set(
             ylabel="sensor [%]", xlabel="time [s]", ylim=(-6, 106), xlim=(0.0, max(float(t[-1]), TRACE_S))
         )
-        self.cursor = self.sensor.axvline(0.0, color=VERMILION, linewidth=1.4)
+        self.cursor = self.below.axvline(0.0, color=VERMILION, linewidth=1.4)
 
     def frames(self, pace: float) -> Iterator[Frame]:
         """Yield the film, frame by frame, shape (height, width, 3)."""
@@ -119,7 +156,7 @@ class _Scene:
                 *((self.floor, part) for part in (*self.obstacles.patches, *self.robot.parts))
             ]
             moving += [(self.listing.axes, part) for part in (self.listing.light, *self.listing.texts)]
-            moving += [(self.sensor, self.cursor), (self.sensor, self.clock)]
+            moving += [(self.below, self.cursor), (self.below, self.clock)]
             for _, part in moving:
                 part.set_animated(True)
             canvas.draw()
@@ -154,23 +191,33 @@ class _Scene:
         """Put all that moves where it is at a sample."""
         trace = self.trace
         self.robot.move(trace["x_m"][sample], trace["y_m"][sample], trace["heading_rad"][sample])
-        self.cursor.set_xdata([trace["t_s"][sample]] * 2)
+        self._mark(sample)
         self.clock.set_text(f"{trace['t_s'][sample]:.1f} s")
         self.listing.lit(int(trace["line"][sample]))
         if self.drive.obstacles is not None:
             self.obstacles.move(self.drive.obstacles[min(sample, len(self.drive.obstacles) - 1)])
 
+    def _mark(self, sample: int) -> None:
+        """Mark below where the drive is."""
+        self.cursor.set_xdata([self.trace["t_s"][sample]] * 2)
 
-def _gif(frames: Iterator[Frame]) -> bytes:
-    """Pack frames; all share one set of colours."""
-    images = [Image.fromarray(frame) for frame in frames]
-    palette = _palette(images[-1])
-    small = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    durations = [1000 // FRAMES_PER_S] * (len(small) - 1) + [LAST_FRAME_MS]
+
+def _gif(frames: Iterator[Frame], palette: Image.Image | None = None) -> bytes:
+    """Pack frames; all share one set of colours, by default the last frame's."""
+    if palette is None:
+        kept = list(frames)
+        frames, palette = iter(kept), _palette(Image.fromarray(kept[-1]))
+    small = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     stream = io.BytesIO()
-    small[0].save(
-        stream, "GIF", save_all=True, append_images=small[1:], duration=durations, loop=0, optimize=False
-    )
+    next(small).save(
+        stream,
+        "GIF",
+        save_all=True,
+        append_images=small,
+        duration=1000 // FRAMES_PER_S,
+        loop=0,
+        optimize=False,
+    )  # frames that are alike become one that stays
     return stream.getvalue()
 
 

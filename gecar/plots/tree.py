@@ -267,6 +267,8 @@ def _draw(axes: Axes, limb: Limb, columns: Sequence[float], colours: dict[str, s
 def _write(axes: Axes, x: float, limb: Limb, mono: dict[str, Any]) -> None:
     """Write a leaf's words, its own in bold between those that its parents put around them."""
     assert limb.words is not None
-    for text, colour, weight in zip(limb.words, (SOFT, INK, SOFT), ("normal", "bold", "normal"), strict=True):
-        axes.text(x, limb.row, text, color=colour, weight=weight, size=_WORDS_PT, va="center", **mono)
-        x += _EM * _WORDS_PT * len(text)
+    before, own, behind = limb.words
+    # Letters that do not belong to a text are spaces in it, so that both stand exactly where they should.
+    around, inside = before + " " * len(own) + behind, " " * len(before) + own
+    axes.text(x, limb.row, around, color=SOFT, size=_WORDS_PT, va="center", **mono)
+    axes.text(x, limb.row, inside, color=INK, size=_WORDS_PT, va="center", weight="bold", **mono)
