@@ -44,11 +44,11 @@ def run(finished, tmp_path):
 
 def test_a_run_leaves_everything_in_its_folder(gecar, tmp_path):
     ended = gecar("evolve", *TINY, "--json")
-    folder = tmp_path / "runs/paper-paper-seed1"
-    assert ended.json["folder"] == "runs/paper-paper-seed1"
+    folder = tmp_path / "runs/paper-better-seed1"
+    assert ended.json["folder"] == "runs/paper-better-seed1"
     assert {path.name for path in folder.iterdir()} == FILES
     assert "The best program, found in generation" in ended.err
-    assert " simulate runs/paper-paper-seed1" in ended.err
+    assert " simulate runs/paper-better-seed1" in ended.err
     assert ended.json["verified_on_pymunk"]
     assert ended.json["evaluations"] == 60
     with Image.open(folder / "convergence.png") as picture:
