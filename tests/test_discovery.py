@@ -6,20 +6,26 @@ The proof that counts is on recordings of other worlds: `benchmarks/concealed`, 
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import signal
+import subprocess
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command import start
 
 from gecar import reality
 from gecar.errors import InputError
 from gecar.plots.discovery import verdict_figures
+from gecar.plots.style import picture
 from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
 from gecar.reality.formula import NAMES, Formula
 from gecar.reality.holdout import split
-from gecar.reality.recording import Case, Recording, make_recording, read_case
+from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
 from gecar.reality.replay import Film
 from gecar.reality.rough_search import rough_search
 from gecar.reality.setup import Setup
@@ -108,6 +114,46 @@ def test_pictures_and_page_are_whole() -> None:
     figures = verdict_figures(verdict)
     assert set(figures) == {"gap", "where", "tried", "traces", "map"}
     assert "commands act late" in verdict_page(verdict, {"gap": b"\x89PNG"})
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
+def test_the_report_opens_in_a_browser_with_all_its_pictures(tmp_path: Path) -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    pictures = {name: picture(figure) for name, figure in verdict_figures(verdict).items()}
+    told = "<script>addEventListener('load', () => document.title = [...document.images].map(i => i.naturalWidth > 400"
+    page = tmp_path / "report.html"
+    page.write_text(verdict_page(verdict, pictures) + told + ").join())</script>", encoding="utf-8")
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-sync",
+    ]
+    flags += ["--disable-background-networking", "--disable-component-update", "--dump-dom"]
+    command = [CHROMIUM, *flags, f"--user-data-dir={tmp_path / 'profile'}", page.as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout  # type: ignore[arg-type]
+    assert f"<title>{','.join(['true'] * len(pictures))}</title>" in dom
+    assert "commands act late" in dom
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_ctrl_c_ends_a_discovery_with_one_word_and_no_verdict(tmp_path: Path) -> None:
+    (tmp_path / "case").mkdir()
+    for seed in range(5):
+        write_recording(recorded(EV3, seed), tmp_path / "case" / f"run_{seed}.csv")
+    process = start("discover", tmp_path / "case", "--out", tmp_path / "out")
+    assert process.stdout is not None
+    assert "fitting on" in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode in (130, -signal.SIGINT)
+    assert said == "stopped\n"
+    assert not (tmp_path / "out").exists()
 
 
 def test_one_recording_is_split_by_time() -> None:

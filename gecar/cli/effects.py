@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,13 +13,22 @@ from gecar.errors import expected
 if TYPE_CHECKING:
     from gecar.world.effects import Effect
 
-IdArgument = Annotated[
-    str | None,
-    typer.Argument(metavar="ID", help="One effect, with all that is known of it.", show_default=False),
+WordsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[show] ID", help="One effect, with all that is known of it.", show_default=False),
 ]
 
 
-def effects(effect: IdArgument = None, as_json: JsonOption = False) -> None:
+def effects(
+    words: WordsArgument = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Where `show` draws its signature.", show_default="ID.png"
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
     """List the physics a simulation may have left out.
 
     Each is a group of parameters with neutral values at which it vanishes. A robot file has a section for each
@@ -28,22 +38,40 @@ def effects(effect: IdArgument = None, as_json: JsonOption = False) -> None:
 
       gecar effects
       gecar effects backlash
+      gecar effects show backlash
     """
     from rich.table import Table
 
     from gecar.world.effects import BY_ID, CATALOGUE
 
     voice = Voice(as_json)
+    show = bool(words) and words is not None and words[0] == "show"
+    named = (words or [])[1:] if show else words or []
+    if len(named) > 1 or (show and not named):
+        raise expected("effects", f"'{' '.join(words or [])}'", "`show` and one effect's name")
+    effect = named[0] if named else None
     if effect is not None and effect not in BY_ID:
         raise expected("effect", f"'{effect}'", f"one of {', '.join(BY_ID)}")
     if effect is not None:
         _describe(voice, BY_ID[effect])
+        if show:
+            _draw(voice, effect, out or Path(f"{effect}.png"))
     else:
         table = Table("effect", "what it is", "where it shows", box=None, pad_edge=False)
         for each in CATALOGUE:
             table.add_row(each.id, each.title, each.signature)
         voice.say(table)
     voice.answer({"effects": [_facts(each) for each in CATALOGUE if effect in (None, each.id)]})
+
+
+def _draw(voice: Voice, effect: str, path: Path) -> None:
+    from gecar.plots.signature import signature_figure
+    from gecar.plots.style import save
+    from gecar.world.course import load_course
+    from gecar.world.robot import load_robot
+
+    save(signature_figure(effect, load_robot("ev3"), load_course("paper")), path)
+    voice.say(f"Its signature: {path}.")
 
 
 def _describe(voice: Voice, effect: Effect) -> None:
