@@ -102,10 +102,11 @@ def draw_genealogy(folder: Path, target: Path) -> Path:
     """Draw who a run's best program descends from; see `gecar.results.ancestry.read_ancestry`."""
     ancestry, config, result = read_ancestry(folder), read_run_config(folder), read_result(folder)
     line, family = ancestry.lineage.line(ancestry.winner), ancestry.lineage.family(ancestry.winner)
+    found, ancestors = ancestry.winner[0], sum(map(len, family)) - 1
     detail = (
-        f"found in generation {ancestry.winner[0]} · {sum(map(len, family)) - 1:,} ancestors whose codons are in it, "
-        f"{len(line) - 1} of them in its own line · {run_detail(config, result)}"
+        f"found in generation {found} · {ancestors:,} ancestors, {len(line) - 1:,} of them in its own line"
     )
+    detail += f" · preset {config.preset}, seed {config.seed}"
     figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, run_title(config, result), detail)
     return save(figure, target)
 

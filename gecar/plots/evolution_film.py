@@ -17,7 +17,7 @@ from gecar.plots.convergence import UNSOLVED
 from gecar.plots.style import BLUE, FAINT
 from gecar.world.rollout import Drive, World
 
-PACE = 8.0
+PACE = 12.0
 """Seconds of driving in a second of film."""
 
 Series = npt.NDArray[np.float64]

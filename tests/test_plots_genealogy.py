@@ -1,0 +1,131 @@
+"""The genealogy of a run's best program, and the film of how it got better."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from command import call
+from PIL import Image
+from searching import MAPPER, SMALL, generations
+
+from gecar.errors import InputError
+from gecar.plots.genealogy import fitness_words, genealogy, steps_of
+from gecar.plots.style import is_whole
+from gecar.results.ancestry import read_ancestry
+from gecar.results.folder import read_result
+from gecar.search.evolution import Evolution
+from gecar.search.lineage import Lineage
+
+VARIED = SMALL.model_copy(update={"crossover": "subtree", "mutation": "used_codon", "creep_rate": 0.3})
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ancestry") / "run"
+    words = (
+        "--population",
+        30,
+        "--generations",
+        5,
+        "--workers",
+        1,
+        "--time-limit",
+        4,
+        "--set",
+        "creep_rate=0.3",
+    )
+    assert call("evolve", *words, "--out", folder, "--quiet", "--no-pictures") == 0
+    return folder
+
+
+def kept(settings, n):
+    evolving = generations(Evolution(settings, MAPPER), n)
+    return Lineage.read(evolving.state().lineage, settings.population)
+
+
+def program_of(lineage):
+    return lambda member: MAPPER.map(lineage.codons_of(member)[None]).program(0)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_a_genealogy_is_within_its_edges(n):
+    lineage = kept(VARIED, n)
+    winner = (n - 1, int(lineage.generations[-1]["merit"].argmin()))
+    assert is_whole(genealogy(lineage, winner, program_of(lineage), "A title", "a detail"))
+
+
+def test_a_long_genealogy_lists_the_latest_steps(monkeypatch):
+    monkeypatch.setattr("gecar.plots.genealogy.MAX_STEPS", 3)
+    lineage = kept(VARIED, 7)
+    most = max(
+        ((6, k) for k in range(20)), key=lambda member: len(steps_of(lineage, member, program_of(lineage)))
+    )
+    steps = steps_of(lineage, most, program_of(lineage))
+    words = [text.get_text() for text in genealogy(lineage, most, program_of(lineage)).axes[1].texts]
+    assert any(f"({len(steps) - 3} earlier steps are not shown)" in text for text in words)
+    assert str(steps[-1].generation) in words
+
+
+def test_each_step_shows_what_is_new():
+    lineage = kept(VARIED, 7)
+    steps = steps_of(lineage, (6, 4), program_of(lineage))
+    assert "".join(text for text, _ in steps[-1].words).startswith(("if(", "motor("))
+    assert steps[0].by == "first population"
+    assert all(any(fresh for _, fresh in step.words) for step in steps[1:] if step.by == "creep")
+
+
+@pytest.mark.parametrize(
+    ("merit", "words"), [(15.7, "15.70 s"), (10_000.6, "40 % of the way"), (10_002.0, "no program")]
+)
+def test_fitness_in_words(merit, words):
+    assert fitness_words(merit) == words
+
+
+def test_the_winner_is_the_program_that_the_run_reports(finished):
+    ancestry = read_ancestry(finished)
+    assert ancestry.program(ancestry.winner).source == read_result(finished)["program"]
+    assert ancestry.winner[0] == read_result(finished)["found_in_generation"]
+
+
+@pytest.mark.parametrize("change", ["cut", "gone", "flipped"])
+def test_a_damaged_lineage_is_one_line(change, finished, tmp_path):
+    folder = Path(shutil.copytree(finished, tmp_path / "run"))
+    raw = (folder / "checkpoint").read_bytes()
+    if change == "gone":
+        (folder / "checkpoint").unlink()
+    else:
+        damaged = raw[:-20] if change == "cut" else raw[:-20] + bytes([raw[-20] ^ 1]) + raw[-19:]
+        (folder / "checkpoint").write_bytes(damaged)
+    with pytest.raises(InputError, match=r"checkpoint: found [^\n]*, expected [^\n]*$"):
+        read_ancestry(folder)
+
+
+def test_plot_draws_only_what_is_named(gecar, finished, tmp_path):
+    before = set(finished.iterdir())
+    named = (
+        "--tree",
+        tmp_path / "t.svg",
+        "--genealogy",
+        tmp_path / "new/g.png",
+        "--evolution",
+        tmp_path / "e.gif",
+    )
+    ended = gecar("plot", finished, *named, "--json").json
+    assert ended["pictures"] == [str(tmp_path / "t.svg"), str(tmp_path / "new/g.png")]
+    assert ended["films"] == [str(tmp_path / "e.gif")]
+    assert set(finished.iterdir()) == before
+    with Image.open(tmp_path / "e.gif") as film:
+        assert film.n_frames > len(read_ancestry(finished).lineage.champions())
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("one", "two", "--tree", "t.png"), "--tree"),
+        (("one", "--evolution", "e.avi"), "--evolution"),
+        (("one", "--genealogy", "g.gif"), ".png"),
+        (("one", "--tree", "t.png"), "config.toml"),
+    ],
+)
+def test_what_can_not_be_drawn_is_one_line(gecar, words, named):
+    assert named in gecar.error("plot", *words)
