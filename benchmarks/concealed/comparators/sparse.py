@@ -3,7 +3,8 @@
 Speeds and accelerations are taken from the recordings by differentiation, and what the nominal robot's equations of
 motion leave over is regressed, by sequentially thresholded least squares, on a library of terms. Each term is the law
 of an effect in closed form, counted in sizes worth a name; the threshold is 1. Effects without such a law, and those
-that slip or play, have no term: it can not name them, and it can not abstain.
+that slip or play, have no term: it can not name them, and it can not abstain. Nor has inertia: noise in an acceleration
+on both sides of an equation would make everything vanish.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import savgol_filter
+from scipy.ndimage import gaussian_filter1d
 
 from gecar.reality.comparison import Strip
 from gecar.reality.discovery import MEMORY_S
@@ -35,8 +36,9 @@ Equation = tuple[
 ]  # what is left over, what it is regressed on, and the unit it is counted in
 
 ROW_S = 0.01
-WINDOW = 15  # rows a derivative is taken over
-ROUNDS = 10
+SMOOTH_ROWS = (
+    4.0  # of the normal weights all series are smoothed with, so that both sides of an equation stay equal
+)
 RESTING = 0.3  # rad/s: where friction has no sign
 GRAVITY = 9.81
 # What noise leaves of each equation on the practice case that conceals nothing, about.
@@ -89,26 +91,24 @@ def _thresholded(equations: Sequence[tuple[Array, Terms]]) -> dict[str, tuple[fl
     library = np.concatenate(
         [np.stack([terms.get(n, np.zeros(len(r))) for n in names], axis=1) for r, terms in equations]
     ) if equations else np.zeros((0, 0))  # fmt: skip
-    kept = list(range(len(names)))
-    sizes = np.zeros(0)
-    for _ in range(ROUNDS):
-        sizes = np.linalg.lstsq(library[:, kept], left, rcond=None)[0]
-        large = [k for k, size in zip(kept, sizes, strict=True) if abs(size) >= 1.0]
-        if large == kept:
-            break
-        kept = large
-    if not kept:
-        return {}
-    chosen = library[:, kept]
-    variance = float(np.mean((left - chosen @ sizes) ** 2))
-    spread = np.sqrt(variance * np.diag(np.linalg.pinv(chosen.T @ chosen)))
-    return {names[k]: (float(sizes[i]), float(spread[i])) for i, k in enumerate(kept)}
+    kept = [k for k in range(len(names)) if np.any(library[:, k])]
+    while kept:
+        chosen = library[:, kept]
+        sizes = np.linalg.lstsq(chosen, left, rcond=None)[0]
+        variance = float(np.mean((left - chosen @ sizes) ** 2))
+        spread = np.sqrt(variance * np.diag(np.linalg.pinv(chosen.T @ chosen)))
+        worth = np.abs(sizes) / np.maximum(1.0, NORMAL_95 * spread)
+        if worth.min() >= 1.0:
+            return {names[k]: (float(sizes[i]), float(spread[i])) for i, k in enumerate(kept)}
+        kept.pop(int(np.argmin(worth)))  # one at a time: of two that are alike, one stays
+    return {}
 
 
 def _torques(recording: Recording, robot: Robot) -> list[Equation]:
     """Return what torque is left over at each shaft [N m] by the nominal motor, robot and friction.
 
-    M dw/dt = K (u V - Ke w) - c sign(w), K = Kt / R; M couples both shafts through the robot's mass and yaw inertia.
+    M dw/dt = K (u V - Ke w) - c sign(w), K = Kt / R; M couples both shafts through the robot's mass and yaw inertia;
+    a centre of mass behind the axle pulls in turns.
     """
     p, t = robot.physics[0], _even(recording.t_s, recording.t_s)
     angles = np.column_stack([recording.left_angle_rad, recording.right_angle_rad])
@@ -117,24 +117,29 @@ def _torques(recording: Recording, robot: Robot) -> list[Equation]:
     angles = np.column_stack([_even(recording.t_s, a) for a in angles.T])
     duty = np.column_stack([np.interp(t, recording.t_s, u) for u in recording.commands.T])
     duty = np.clip(duty, -p["duty_cap"], p["duty_cap"])
-    w, dw, du = _slope(angles), _slope(angles, 2), _slope(duty)
+    w, dw, duty, du = _slope(angles), _slope(angles, 2), _slope(duty, 0), _slope(duty)
     ahead = p["mass"] * p["wheel_radius"] ** 2 / 4.0
-    aside = p["yaw_inertia"] * p["wheel_radius"] ** 2 / p["track_width"] ** 2
+    mount = p["mass"] * p["com_ahead"]
+    aside = (p["yaw_inertia"] + mount * p["com_ahead"]) * p["wheel_radius"] ** 2 / p["track_width"] ** 2
     own, other = p["inertia"] + ahead + aside, ahead - aside
     gain, sign = p["torque_constant"] / p["resistance"], np.sign(w) * (np.abs(w) > RESTING)
     drive = gain * (duty * p["voltage"] - p["back_emf_constant"] * w)
     left = own * dw + other * dw[:, ::-1] - drive + p["coulomb_friction"] * sign
+    turn = p["wheel_radius"] * (w[:, 1] - w[:, 0]) / p["track_width"]
+    swing = mount * p["wheel_radius"] ** 2 / p["track_width"] * turn * w.mean(axis=1)
+    left += (-0.5 * p["wheel_radius"] * mount * turn**2)[:, None] + swing[:, None] * np.array([-1.0, 1.0])
     drawn = np.sum(np.abs(duty * drive) / p["torque_constant"], axis=1)
     full = gain * p["voltage"]
     heading = _even(recording.t_s, recording.heading_rad)
-    pull = 0.5 * p["mass"] * GRAVITY * p["wheel_radius"]
+    # Both wheels share a pull along the floor; without a heading there is none to see.
+    pull = np.full(2, 0.5 * p["mass"] * GRAVITY * p["wheel_radius"] * np.any(heading))
     columns = {
         "coulomb_friction": -sign, "viscous_friction": -w, "static_friction": -sign * np.exp(-(w**2)),
         "friction_ratio": -p["coulomb_friction"] * np.abs(sign), "direction_gain": full * np.abs(duty),
-        "dead_band": -full * np.sign(duty), "inertia_scale": -p["inertia"] * dw, "actuation_delay": -full * du,
+        "dead_band": -full * np.sign(duty), "actuation_delay": -full * du,
         "gain_difference": full * duty * np.array([-0.5, 0.5]), "supply_scale": full * duty,
         "battery_resistance": -gain * duty * drawn[:, None], "battery_drain": -gain * duty * t[:, None],
-        "tilt_x": np.tile(pull * np.cos(heading)[:, None], 2), "tilt_y": np.tile(pull * np.sin(heading)[:, None], 2),
+        "tilt_x": np.cos(heading)[:, None] * pull, "tilt_y": np.sin(heading)[:, None] * pull,
     }  # fmt: skip
     moving = (np.abs(w) > RESTING).ravel()
     return [(left.ravel()[moving], {f: g.ravel()[moving] for f, g in columns.items()}, TORQUE_NM)]
@@ -177,5 +182,5 @@ def _even(t: Array, values: Array) -> Array:
 
 
 def _slope(values: Array, order: int = 1) -> Array:
-    """Return a derivative of a local parabola (Savitzky and Golay 1964)."""
-    return np.asarray(savgol_filter(values, WINDOW, 2, deriv=order, delta=ROW_S, axis=0))
+    """Return a derivative of the smoothed values; the values themselves for order 0."""
+    return np.asarray(gaussian_filter1d(values, SMOOTH_ROWS, axis=0, order=order) / ROW_S**order)
