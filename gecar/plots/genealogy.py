@@ -34,7 +34,7 @@ _MARKS = {
 _COLOURS = "viridis_r"
 _UNSOLVED_COLOUR = "#E9ECEF"
 _WIDTH_IN, _MAP_IN, _ROW_IN = 11.0, 4.4, 0.215
-_LETTERS, _PT = 100, 7.0
+_LETTERS, _PT = 92, 7.0
 
 Ranks = list[npt.NDArray[np.int64]]
 
@@ -184,7 +184,7 @@ def _draw_family(axes: Axes, lineage: Lineage, winner: Member, ranks: Ranks) -> 
         for parent in lineage.parents((generation, place))
     ]
     lines = [[_at(one, ranks), _at(other, ranks)] for one, other in pairs]
-    alpha = min(0.6, max(0.08, 6.0 * (winner[0] + 1) / max(len(lines), 1)))
+    alpha = min(0.6, max(0.08, 350.0 / max(len(lines), 1)))  # many lines together must not hide the times
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.7, alpha=alpha), autolim=False)
 
 
@@ -206,7 +206,8 @@ def _draw_line(axes: Axes, lineage: Lineage, winner: Member, ranks: Ranks) -> No
                 label=f"changed by {name}",
                 **style,
             )
-    axes.plot([], [], color=INK, linewidth=0.7, label="others it descends from")
+    if any(len(places) > 1 for places in lineage.family(winner)):
+        axes.plot([], [], color=INK, linewidth=0.7, label="others it descends from")
     axes.legend(ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
