@@ -22,11 +22,23 @@ def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
     """Judge a step by leaving out recordings, and against the null."""
     new = step.model
     several = len(np.unique(fits.blocks.folds)) > 1
-    # The model below is asked to predict, too: what it fitted to the left-out recording would flatter it.
-    gains = _left_out(fits, step.base) - _left_out(fits, new) if several else np.array([step.gain])
+    gains = _gains(fits, step.base, new) if several else np.array([step.gain])
     nulls = null(fits, catalogue, new)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)
+
+
+def _gains(fits: Fits, base: Model, new: Model) -> Array:
+    """Return what a model gains on each fold when that is left out, shape (folds,).
+
+    The model below is asked to predict, too: what it fitted to the left-out recording would flatter it. But leaving
+    out may cost it no more than it costs the new one; else a base that falls apart would let everything pass.
+    """
+    folds = fits.blocks.folds
+    before, after = _left_out(fits, base), _left_out(fits, new)
+    lost = np.maximum(after - np.bincount(folds, costs(new.fit.errors)), 0.0)
+    out: Array = np.minimum(before, np.bincount(folds, costs(base.fit.errors)) + lost) - after
+    return out
 
 
 def _left_out(fits: Fits, model: Model) -> Array:
