@@ -221,7 +221,7 @@ def _list(axes: Axes, steps: Sequence[Step], earlier: int) -> None:
     axes.set(xlim=(0.0, 1.0), ylim=(len(steps) - 0.4, -1.6))
     names: dict[str, Any] = {"size": 8, "color": SOFT, "va": "center"}
     first = "program, what is new in bold" + (f" ({earlier} earlier steps are not shown)" if earlier else "")
-    columns = (0.045, 0.06, 0.41, 0.425)
+    columns = (0.045, 0.06, 0.45, 0.465)
     for x, words, side in zip(
         columns, ("generation", "by", "came to", first), ("right", "left", "right", "left"), strict=True
     ):
