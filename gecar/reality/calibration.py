@@ -39,7 +39,7 @@ from gecar.world.robot import Robot, load_robot
 Array = npt.NDArray[np.float64]
 
 MEMORY_S = 1.0
-SPAN_S = 2.0  # of a recording is one group of the jackknife, where recordings are few
+SPAN_S = 2.0  # of a recording is one group of the jackknife
 FEWEST_GROUPS = 5
 # What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
 TRUST_STEPS = 0.15
@@ -64,7 +64,7 @@ class Fitted:
     def rounded(self, value: float) -> str:
         """Return a number with the digits the interval allows, and one more."""
         places = max(1 - math.floor(math.log10(max(self.high - self.low, 1e-12))), 0)
-        return f"{value:.{min(places, 8)}f}"
+        return f"{round(value, min(places, 8)) + 0.0:.{min(places, 8)}f}"  # never -0.00
 
 
 @dataclass(frozen=True)
@@ -224,10 +224,20 @@ def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...
 
 
 def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> Array:
-    """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of a few."""
+    """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of them.
+
+    Where there are recordings enough, the wider of both: a constant that one or two of them tell is told by few groups.
+    """
     errors, slopes = sensitivities(comparison, slack, z)
     slopes = slopes[:, told]
-    groups = _groups(comparison)
+    halves = [_half_width(errors, slopes, groups) for groups in _groupings(comparison)]
+    out = np.zeros(len(z))
+    out[told] = np.hypot(np.max(halves, axis=0), TRUST_STEPS)
+    return out
+
+
+def _half_width(errors: Array, slopes: Array, groups: npt.NDArray[np.int64]) -> Array:
+    """Return half the 95 % intervals by leaving out one group after the other, shape (told,)."""
     normal = slopes.T @ slopes
     leaps = []
     for group in np.unique(groups):
@@ -236,19 +246,16 @@ def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np
         leaps.append(np.linalg.pinv(part, hermitian=True) @ (slopes[rows].T @ errors[rows]))
     count = len(leaps)
     variance = (count - 1) / count * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    out = np.zeros(len(z))
-    out[told] = np.hypot(student.ppf(0.975, count - 1) * np.sqrt(variance), TRUST_STEPS)
-    return out
+    return np.asarray(student.ppf(0.975, count - 1) * np.sqrt(variance))
 
 
-def _groups(comparison: Comparison) -> npt.NDArray[np.int64]:
-    """Return each residual's group: its recording, or where those are few, a span of it."""
+def _groupings(comparison: Comparison) -> list[npt.NDArray[np.int64]]:
+    """Return each residual's group: a span of its recording, and its recording where those are not few."""
     cells = comparison.cells
     recording = cells.recording.astype(np.int64)
-    if len(np.unique(recording)) >= FEWEST_GROUPS:
-        return recording
     span = (cells.t_s / SPAN_S).astype(np.int64)
-    return recording * (span.max() + 1) + span
+    spans = recording * (span.max() + 1) + span
+    return [spans, recording] if len(np.unique(recording)) >= FEWEST_GROUPS else [spans]
 
 
 def _judged(

@@ -57,7 +57,7 @@ def _starts(comparison: Comparison, slack: Slack, told: Chosen) -> Iterator[Arra
     yield begin
     for names in _PLACES:
         begin = _scanned(comparison, slack, told & _named(slack.constants, names), begin)
-    yield begin
+        yield begin
 
 
 def _from(comparison: Comparison, slack: Slack, free: Chosen, start: Array) -> Fit:

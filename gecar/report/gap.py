@@ -52,6 +52,11 @@ def gap_title(found: Gap) -> str:
     """Say in a few words what is compared, and the gap in time where there is one."""
     where = (found.course.title or found.course.name) if found.course else "Blank floor"
     errors = [t.error_pct for t in found.trials if not math.isnan(t.error_pct)]
+    if len(errors) < len(found.trials) and any(t.arrived for t in found.trials):
+        lost = "" if found.outcome in (None, Outcome.GOAL) else ", the simulation does not"
+        return (
+            f"{where}: {sum(t.arrived for t in found.trials)} of {len(found.trials)} drives reach GOAL{lost}"
+        )
     if errors:
         return f"{where}: the real robot arrives {abs(np.mean(errors)):.1f} % {_late(float(np.mean(errors)))}"
     return f"{where}: {'commands replayed' if found.outcome is None else 'simulation'} beside recordings"
