@@ -63,7 +63,18 @@ def _shortest(driver: Driver, opcodes: Any, repeats: int) -> float:
 
 def evolve(out: Path, cache: Path) -> tuple[float, dict[str, Any]]:
     """Run `gecar evolve` with the paper's preset; return its wall time [s] and its result."""
-    command = [sys.executable, "-m", "gecar", "evolve", "--workers", str(CORES), "--out", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "gecar",
+        "evolve",
+        "--preset",
+        "paper",
+        "--workers",
+        str(CORES),
+        "--out",
+        str(out),
+    ]
     start = time.perf_counter()
     subprocess.run(
         command, check=True, capture_output=True, env={**os.environ, "GECAR_CACHE_DIR": str(cache)}
