@@ -38,7 +38,7 @@ format: $(VENV)/.check  ## Put the sources in the format that check wants
 	$(VENV)/bin/ruff format
 	$(VENV)/bin/ruff check --fix
 
-bench: $(VENV)/.runtime  ## Measure how fast gecar is, and print it as a table
+bench: $(VENV)/.cluster  ## Measure how fast gecar is, and print it as a table
 	$(PY) -m benchmarks $(ARGS)
 
 concealed: $(VENV)/.test  ## Examine gecar discover on concealed robots (hours; resumes)
@@ -60,7 +60,7 @@ $(VENV)/.runtime: pyproject.toml | $(PY)
 	@$(PIP) install --quiet --editable .
 	@touch $@
 
-$(VENV)/.test $(VENV)/.check: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
+$(VENV)/.test $(VENV)/.check $(VENV)/.cluster: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
 	@$(PIP) install --quiet --editable '.[$*]'
 	@touch $@

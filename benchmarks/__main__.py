@@ -43,7 +43,7 @@ def measured(name: str) -> list[tuple[str, str, str]]:
     try:
         rows: Rows = import_module(f"benchmarks.{name}").rows
     except ModuleNotFoundError as error:
-        return [(f"skipped: needs {error.name}", "-", "pip install -e '.[bench]'")]
+        return [(f"skipped: needs {error.name}", "-", "pip install -e '.[bench,cluster]'")]
     return rows()
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import time
 
+import distributed  # noqa: F401  without it there is nothing to measure
+
 from gecar.results.config import configure
 from gecar.results.performing import perform
 from gecar.search.executors import open_executor
