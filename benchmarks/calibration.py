@@ -4,6 +4,12 @@ Every case is a robot whose own constants, and whose camera's mark, are drawn an
 `benchmarks.concealed` (MuJoCo, extra ``bench``), which shares no code with gecar: five recordings to fit on and one to
 judge by, with a noise level, a colour and a camera of its own. An honest interval of 95 % holds the truth in 95 cases
 of 100; of 120 cases, between 109 and 118 (95 % of binomial draws).
+
+On 20 cases, what moves the robot, white and black and the camera's mark are held in 18 to 20. Not honest yet: where the
+sensor and the course lie (held in 7 to 10), which line following along two sides and one corner hardly tells apart, so
+that a path that is off by half a millimetre moves all of them together by 1 to 5 mm; and ``gain_ratio`` (held in 10),
+where the worlds differ: here a gain changes the torque, in gecar the voltage, which also loads the battery. The
+difference is 0.10 x gain x battery resistance [ohm] to 0.00015.
 """
 
 from __future__ import annotations

@@ -25,6 +25,10 @@ _LEVELS = ("white", "black")
 _PLACES = (("ahead", "left"), ("course_x", "course_y", "course_turn"))
 _SCAN = np.linspace(-8.0, 8.0, 5)  # steps: 12 mm of the sensor's place, 16 mm and 1 degree of the course's
 _ROUNDS = 20
+_AGAIN, _WORTH = (
+    6,
+    1e-3,
+)  # fits more, and the share of its cost by which one must help to be followed by another
 
 
 def fitted(comparison: Comparison, slack: Slack, told: Chosen, last: Array) -> Array:
@@ -61,14 +65,25 @@ def _starts(comparison: Comparison, slack: Slack, told: Chosen) -> Iterator[Arra
 
 
 def _from(comparison: Comparison, slack: Slack, free: Chosen, start: Array) -> Fit:
+    """Fit from a start; sight again from its end with finer differences, until that helps no more.
+
+    The sensor's place and the course's are told apart by corners only: a long, narrow valley, in which a fit with
+    coarse differences stops short.
+    """
     low, high = slack.bounds
-    return fit(
-        lambda part: slack.errors(comparison, _whole(start, free, part)),
-        start[free],
-        (low[free], high[free]),
-        np.full(int(free.sum()), PROBE),
-        rounds=_ROUNDS,
-    )
+
+    def once(at: Array, probe: float) -> Fit:
+        probes = np.full(int(free.sum()), probe)
+        return fit(lambda part: slack.errors(comparison, _whole(start, free, part)), at, (low[free], high[free]),
+                   probes, rounds=_ROUNDS)  # fmt: skip
+
+    end = once(start[free], PROBE)
+    for _ in range(_AGAIN if comparison.sight else 0):
+        finer = once(end.z, 0.25 * PROBE)
+        if finer.cost > (1.0 - _WORTH) * end.cost:
+            return min(end, finer, key=lambda found: found.cost)
+        end = finer
+    return end
 
 
 def _scanned(comparison: Comparison, slack: Slack, free: Chosen, begin: Array) -> Array:
