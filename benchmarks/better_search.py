@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.studies import number, performed, piped, planned
+from benchmarks.studies import performed, planned
 from gecar.files import write_whole
+from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.search.settings import PRESETS
@@ -95,8 +96,8 @@ def _figures(cell: Cell) -> list[str]:
     times = cell.times_s
     return [
         f"{cell.solved}/{len(times)}",
-        f"{number(cell.quantile_s(0.5))} ({number(low)} to {number(high)})",
-        number(float(times.max())),
+        f"{seconds(cell.quantile_s(0.5))} ({seconds(low)} to {seconds(high)})",
+        seconds(float(times.max())),
         _count(evaluations_to(cell, PAPERS_BEST_S)),
     ]
 

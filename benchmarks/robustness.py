@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.studies import number, performed, piped, planned
+from benchmarks.studies import performed, planned
 from gecar.files import write_whole
 from gecar.language.program import parse_program
+from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell
 from gecar.results.config import configure
 from gecar.results.running import load_task
@@ -56,9 +57,9 @@ def table(cells: Sequence[Cell]) -> str:
     for cell in cells:
         at_goal, median_s = shares(cell)
         cost = np.median([record["simulated_steps"] for record in cell.records]) / cost_of_one
-        words = [str(cell.column), number(cell.quantile_s(0.5)), f"{100 * np.median(at_goal):.0f} %"]
+        words = [str(cell.column), seconds(cell.quantile_s(0.5)), f"{100 * np.median(at_goal):.0f} %"]
         lines.append(
-            [*words, f"{100 * at_goal.min():.0f} %", number(float(np.median(median_s))), f"{cost:.1f} x"]
+            [*words, f"{100 * at_goal.min():.0f} %", seconds(float(np.median(median_s))), f"{cost:.1f} x"]
         )
     note = f"Medians over {len(cells[0].records)} seeds; least is the worst seed's; cost in simulated steps."
     return f"{piped(lines)}\n{note}\n"

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
@@ -39,14 +38,3 @@ def performed(runs: Sequence[Planned], out: Path) -> list[Cell]:
         place = Workplace.of("process", usable_cores())
         perform_all(left, folder, place, lambda _: bar.advance(task))
     return cells_of(runs, [folder.load(run) for run in runs])
-
-
-def number(value: float) -> str:
-    """Write a time [s]; a dash where there is none."""
-    return f"{value:.2f}" if np.isfinite(value) else "-"
-
-
-def piped(lines: Sequence[Sequence[str]]) -> str:
-    """Write lines of words as a Markdown table, the first as its head."""
-    head, *rest = (f"| {' | '.join(line)} |" for line in lines)
-    return "\n".join([head, "|---" * len(lines[0]) + "|", *rest]) + "\n"

@@ -74,7 +74,20 @@ def test_finished_runs_are_kept_and_not_performed_again(tmp_path):
 
 def test_a_run_of_a_study_is_the_run_evolve_makes(gecar, tmp_path):
     run = study().plan()[1]
-    words = ("--population", 10, "--generations", 1, "--codons", 50, "--elites", 0, "--mutation-rate", 0.5)
+    words = (
+        "--preset",
+        "paper",
+        "--population",
+        10,
+        "--generations",
+        1,
+        "--codons",
+        50,
+        "--elites",
+        0,
+        "--mutation-rate",
+        0.5,
+    )
     gecar("evolve", *words, "--seed", 1, "--workers", 1, "--out", "alone", "--no-pictures", "--quiet")
     alone = json.loads((tmp_path / "alone/result.json").read_text())
     ours = perform(run.config)

@@ -93,7 +93,7 @@ def contrasts(study: Study, cells: Sequence[Cell]) -> str:
         f"Against the first cell ({first.row}, {first.column}): A12 is how often a run is faster than one of the "
         "first cell's (Vargha and Delaney; 0.5 is no difference), p the Mann-Whitney test's, corrected by Holm."
     )
-    return f"{_piped(lines)}\n\n{note}"
+    return f"{piped(lines)}\n\n{note}"
 
 
 def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
@@ -194,7 +194,7 @@ def _matrix(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, flo
             shown.append(seconds(cell.mean_s) + (f" ({seconds(value)})" if value is not None else ""))
         lines.append(shown)
     note = "Mean of the best time to GOAL over the seeds [s]; a dash where a run did not get there"
-    return _piped(lines) + f"\n\n{note}{'; in brackets the paper' if paper else ''}."
+    return piped(lines) + f"\n\n{note}{'; in brackets the paper' if paper else ''}."
 
 
 def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
@@ -202,10 +202,11 @@ def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float
         "A run without GOAL counts as slower than any in mean, median and worst; sd is of the runs at GOAL. "
         "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
     )
-    return _piped([_heads(study, paper), *(_words(cell, paper) for cell in cells)]) + f"\n\n{note}"
+    return piped([_heads(study, paper), *(_words(cell, paper) for cell in cells)]) + f"\n\n{note}"
 
 
-def _piped(lines: Sequence[Sequence[str]]) -> str:
+def piped(lines: Sequence[Sequence[str]]) -> str:
+    """Write lines of words as a Markdown table, the first as its head."""
     head, *rest = (f"| {' | '.join(line)} |" for line in lines)
     rule = "|" + "|".join(["---"] * len(lines[0])) + "|"
     return "\n".join([head, rule, *rest])
