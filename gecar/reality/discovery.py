@@ -150,7 +150,7 @@ def discover(
     )
     white, p = whiteness(motion, moved.taken)
     physics = moved.taken.freedom.physics(moved.taken.fit.z)
-    formulas = describe(shop.strips, shop.held, physics) if moved.unexplained else ()
+    formulas = describe(shop.strips, physics) if moved.unexplained else ()
     return Verdict(
         case=case.name,
         verdict=verdict,

@@ -37,7 +37,8 @@ Array = npt.NDArray[np.float64]
 
 MOST_TERMS = 3
 LEAST_GAIN = 0.04  # of the energy of left-out recordings: what a term must explain
-LEAST_SHARE = 0.15  # of the energy of the recordings set aside: less describes nothing
+LEAST_SHARE = 0.15  # of the energy of left-out recordings: less describes nothing
+FEWEST = 3  # recordings to leave one out of; fewer are cut into as many parts in time
 RESAMPLES = 20
 STABLE = 0.6  # of the resamples must choose a term
 FORGIVING = 6.0  # standard deviations at which residuals are cut
@@ -54,7 +55,7 @@ class Formula:
     terms
         Coefficient and name of each term.
     share
-        Of the residual's energy in that channel it explains on the recordings set aside.
+        Of the residual's energy in that channel it explains, by leaving out one fitted recording after another.
     """
 
     target: str
@@ -99,33 +100,37 @@ TARGETS = (
 )  # fmt: skip
 
 
-def describe(
-    fitted: Sequence[Strip], held: Sequence[Strip], physics: npt.NDArray[Any]
-) -> tuple[Formula, ...]:
-    """Return formulas that describe what a model leaves, the most telling first; none if none holds on hold-out.
+def describe(fitted: Sequence[Strip], physics: npt.NDArray[Any]) -> tuple[Formula, ...]:
+    """Return formulas that describe what a model leaves, the most telling first.
+
+    Chosen by leaving out fitted recordings alone: those set aside are for the judge.
 
     Parameters
     ----------
-    fitted, held
-        Recordings to find them on, and to judge them by.
+    fitted
+        Recordings to find them on.
     physics
         Record of the model, shape (1,).
     """
     found = []
     tables = [_signals(strip, physics) for strip in fitted]
-    proofs = [_signals(strip, physics) for strip in held]
     for number, (target, unit) in enumerate(TARGETS):
-        signals = [table[number] for table in tables if len(table[number].residual)]
-        judges = [table[number] for table in proofs if len(table[number].residual)]
-        if signals and judges:
-            formula = _sparse(target, unit, signals, judges)
-            if formula is not None:
-                loudness = sum(s.energy for s in judges)
-                found.append((formula.share * loudness, formula))
+        signals = _enough([table[number] for table in tables if len(table[number].residual)])
+        formula = _sparse(target, unit, signals) if signals else None
+        if formula is not None:
+            found.append((formula.share * sum(s.energy for s in signals), formula))
     return tuple(formula for _, formula in sorted(found, key=lambda pair: -pair[0]))
 
 
-def _sparse(target: str, unit: str, signals: list[_Signal], judges: list[_Signal]) -> Formula | None:
+def _enough(signals: list[_Signal]) -> list[_Signal]:
+    """Return signals that can be left out in turn: few recordings are cut into parts in time."""
+    if len(signals) >= FEWEST:
+        return signals
+    parts = [(np.array_split(s.residual, FEWEST), np.array_split(s.terms, FEWEST)) for s in signals]
+    return [_Signal(*pair) for residuals, terms in parts for pair in zip(residuals, terms, strict=True)]
+
+
+def _sparse(target: str, unit: str, signals: list[_Signal]) -> Formula | None:
     chosen = _chosen(signals)
     if not chosen:
         return None
@@ -134,15 +139,13 @@ def _sparse(target: str, unit: str, signals: list[_Signal], judges: list[_Signal
     for _ in range(RESAMPLES):
         drawn = rng.integers(0, len(signals), len(signals))
         votes[_chosen([signals[k] for k in drawn])] += 1.0 / RESAMPLES
-    kept = [k for k in chosen if votes[k] >= STABLE or len(signals) < 3]
+    kept = [k for k in chosen if votes[k] >= STABLE]
     if not kept:
         return None
-    coefficients = _fitted(signals, kept)
-    total = sum(s.energy for s in judges)
-    left = sum(float(np.sum((s.residual - s.terms[:, kept] @ coefficients) ** 2)) for s in judges)
-    share = 1.0 - left / max(total, 1e-12)
+    share = 1.0 - _left_out(signals, kept) / max(sum(s.energy for s in signals), 1e-12)
     if share < LEAST_SHARE:
         return None
+    coefficients = _fitted(signals, kept)
     return Formula(
         target, unit, tuple((float(c), NAMES[k]) for c, k in zip(coefficients, kept, strict=True)), share
     )
@@ -170,9 +173,7 @@ def _left_out(signals: list[_Signal], chosen: list[int]) -> float:
     ridge = 1e-6 * np.eye(len(chosen)) * (np.trace(normal) + 1e-12)
     left = 0.0
     for s in signals:
-        alone = len(signals) < 2
-        rest, ask = (normal, pull) if alone else (normal - s.normal[at], pull - s.pull[chosen])
-        c = np.linalg.solve(rest + ridge, ask)
+        c = np.linalg.solve(normal - s.normal[at] + ridge, pull - s.pull[chosen])
         left += s.energy - 2.0 * float(c @ s.pull[chosen]) + float(c @ s.normal[at] @ c)
     return left
 

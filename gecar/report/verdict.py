@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gecar.reality.holdout import Misfit
 from gecar.reality.verdict import Found, Interval, Place, Verdict
 from gecar.world.effects import BY_ID
 
@@ -18,6 +19,8 @@ def sentences(verdict: Verdict) -> list[str]:
     out += [_effect(found) for found in verdict.effects]
     if verdict.effects:
         out.append(_proof(verdict))
+    if verdict.verdict == "missing" and not verdict.residual.white:
+        out.append("What is left is more than noise, but little beside what was found.")
     if verdict.verdict.endswith("unexplained"):
         out.append(_unexplained(verdict))
     if verdict.located:
@@ -81,11 +84,14 @@ def _unexplained(verdict: Verdict) -> str:
     if verdict.residual.formula:
         words += f" This describes it, and is no cause: {verdict.residual.formula}."
     if verdict.residual.described:
-        gains = ", ".join(
-            f"{c} {m.before:.4f} to {m.after:.4f}" for c, m in verdict.residual.described.items()
-        )
+        gains = ", ".join(f"{c} {_change(m)}" for c, m in verdict.residual.described.items())
         words += f" Added to the replays, it brings the NRMSE on what was set aside from {gains}."
     return words
+
+
+def _change(misfit: Misfit) -> str:
+    worse = " (worse)" if misfit.after > misfit.before else ""
+    return f"{misfit.before:.4f} to {misfit.after:.4f}{worse}"
 
 
 def _place(place: Place) -> str:
