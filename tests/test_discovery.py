@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -21,15 +22,18 @@ from gecar import reality
 from gecar.errors import InputError
 from gecar.plots.discovery import verdict_figures
 from gecar.plots.style import picture
+from gecar.reality.comparison import Strip
 from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
-from gecar.reality.formula import NAMES, Formula
-from gecar.reality.holdout import split
+from gecar.reality.formula import NAMES, Formula, describe
+from gecar.reality.holdout import Misfit, split
+from gecar.reality.noise import estimate_noise
 from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
 from gecar.reality.replay import Film
 from gecar.reality.rough_search import rough_search
 from gecar.reality.setup import Setup
-from gecar.reality.verdict import Verdict
+from gecar.reality.verdict import Judgement, Residual, Verdict
+from gecar.reality.whiteness import whiteness
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_page
 from gecar.world.robot import Robot, load_robot
@@ -86,6 +90,18 @@ def test_a_verdict_closes_the_gap_on_recordings_it_never_fitted() -> None:
     assert not set(verdict.fitted_on) & set(verdict.judgement.recordings)
     assert verdict.judgement.gap_closed is not None
     assert verdict.judgement.gap_closed > 0.9
+
+
+def test_the_gap_closed_counts_every_channel() -> None:
+    channels = {"x_m": Misfit(1.0, 0.2, 0.1), "heading_deg": Misfit(0.12, 0.18, 0.1)}
+    judged = Judgement(("run_07",), False, channels)
+    assert judged.gap_closed == pytest.approx((1.12 - 0.38) / (1.12 - 0.2))
+
+
+def test_what_a_missing_effect_leaves_on_a_bench_is_not_white() -> None:
+    evidence = verdict_on("viscous_friction", "coefficient_nms", 0.004, rig="bench").evidence
+    assert not whiteness(evidence.motion, evidence.motion.nothing)[0]
+    assert whiteness(evidence.motion, evidence.moved.taken)[0]
 
 
 def test_a_bench_needs_no_camera() -> None:
@@ -176,6 +192,22 @@ def test_rough_search_finds_the_bottom_of_a_jagged_bowl() -> None:
     found, cost = rough_search(jagged, np.zeros(3), np.ones(3), bounds, np.random.default_rng(0), 60)
     assert np.all(np.abs(found - 0.7) < 0.2)
     assert cost < 0.0
+
+
+def test_a_formula_is_found_on_one_fitted_recording_alone_and_none_in_noise() -> None:
+    recording, slow = recorded(EV3, 1), EV3.with_effects({"motor_gain_asymmetry": {"right_minus_left": 0.1}})
+    strip = Strip(recording, estimate_noise([recording], EV3.physics, 1.0), 1.0, None)
+    assert describe([strip], EV3.physics) == ()
+    formulas = describe([strip], slow.physics)
+    assert {f.target for f in formulas} >= {"the left wheel's speed", "the right wheel's speed"}
+    assert all(0.15 < f.share < 1.0 for f in formulas)
+
+
+def test_a_formula_that_harms_a_channel_says_so() -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    described = {"x_m": Misfit(0.1, 0.05, 0.01), "y_m": Misfit(0.1, 0.2, 0.01)}
+    harmed = replace(verdict, verdict="unexplained", residual=Residual(False, 0.01, "x", described))
+    assert "x_m 0.1000 to 0.0500, y_m 0.1000 to 0.2000 (worse)" in str(harmed)
 
 
 def test_every_term_of_a_formula_has_one_name() -> None:

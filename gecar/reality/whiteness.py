@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gecar.reality.chain import MOTION
 from gecar.reality.model import Model
 from gecar.reality.selection import Selection
 from gecar.reality.subtle import subtle_slopes
@@ -16,7 +17,8 @@ def whiteness(selection: Selection, model: Model) -> tuple[bool, float]:
     """Return whether a model's residuals pass for noise, and the p-value.
 
     The nulls are recordings of robots that differ from the model in every constant by less than is worth a name, with
-    white noise: structure that such robots have is the price of any model.
+    white noise; but never by more than a simulation is off where nothing is missing (`chain.MOTION`). Without that
+    cap sensors far finer than such sizes would let anything pass: a motor on a bench, a thousandfold its noise.
     """
     if not selection.blocks.count:
         return True, 1.0
@@ -27,6 +29,8 @@ def whiteness(selection: Selection, model: Model) -> tuple[bool, float]:
     drawn = []
     for _ in range(DRAWS):
         noise = np.sqrt(blocks.samples) * rng.standard_normal(blocks.count)  # a block's sum of white noise
-        drawn.append(blocks.structure_of_sums(noise + felt @ rng.uniform(-SUBTLE, SUBTLE, felt.shape[1])))
+        off = felt @ rng.uniform(-SUBTLE, SUBTLE, felt.shape[1])
+        off *= min(1.0, np.sqrt(MOTION.floor / max(float(np.mean(off**2 / blocks.samples)), 1e-12)))
+        drawn.append(blocks.structure_of_sums(noise + off))
     p = float((1 + np.sum(np.array(drawn) >= model.structure)) / (1 + DRAWS))
     return p > 0.05, p
