@@ -101,7 +101,7 @@ def _recorded(
     worlds: dict[str, Array] = {}
     for run, run_rng in enumerate(run_rngs):
         path = folder / f"run_{run + 1:02d}_{RUNS[run]}.csv"
-        worlds |= _record(path, run, hidden, conditions, run_rng)
+        worlds |= record(path, run, hidden, conditions, run_rng)
     return hidden, conditions, worlds
 
 
@@ -176,7 +176,7 @@ def broken_seals(out: Path) -> list[str]:
     return [name for digest, name in entries if not (out / name).is_file() or _digest(out / name) != digest]
 
 
-def _record(path: Path, run: int, hidden: Hidden, conditions: Conditions, rng: Rng) -> dict[str, Array]:
+def record(path: Path, run: int, hidden: Hidden, conditions: Conditions, rng: Rng) -> dict[str, Array]:
     """Drive one recording, write it, and return the noise-free channels of every world."""
     robot, offset = hidden.robots[run], conditions.camera_offset_s(run)
     start, controller = _task(RUNS[run], rng)

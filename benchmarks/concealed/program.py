@@ -25,6 +25,7 @@ _COMPARE: tuple[Callable[[float, float], bool], ...] = (
     operator.eq,
     operator.ne,
 )
+_INTO_GOAL = 0.3  # of a tile
 _MOST_JUMPS = 10_000  # within one moment: such a program waits for nothing
 
 START: Pose = (0.175, 0.75, math.pi / 2)  # START tile, one line's width right of the line, heading up
@@ -49,7 +50,7 @@ class Round:
 
     ``outcome``: ``goal``, ``missed_checkpoint``, ``off_course``, ``out_of_time`` or ``stuck``; ``time_s`` when it
     ended; ``arrivals_s`` when each tile of ``ROUND`` was entered in turn (20,), nan where it was not; ``history``
-    up to the end.
+    up to the end, and a little way into GOAL.
     """
 
     outcome: str
@@ -166,8 +167,9 @@ def drive(
 
 
 def _ended(x: float, y: float) -> bool:
+    """End off the course, or far enough inside GOAL for a camera to have seen it."""
     tile = (math.floor(x / TILE), math.floor(y / TILE))
-    return tile not in ROUND or tile == ROUND[-1]
+    return tile not in ROUND or (tile == ROUND[-1] and y > (tile[1] + _INTO_GOAL) * TILE)
 
 
 def referee(history: History) -> Round:
@@ -195,7 +197,8 @@ def referee(history: History) -> Round:
             reached += 1
             arrivals[reached] = now
         if tile == ROUND[-1]:
-            outcome = "goal" if reached == len(ROUND) - 1 else "missed_checkpoint"
-            return Round(outcome, now, arrivals, history.until(tick + 1))
+            if reached == len(ROUND) - 1:
+                return Round("goal", now, arrivals, history)
+            return Round("missed_checkpoint", now, arrivals, history.until(tick + 1))
     end = float(history.time_s[-1])
     return Round("out_of_time" if end >= TIME_LIMIT_S else "stuck", end, arrivals, history)
