@@ -202,7 +202,7 @@ CATALOGUE: tuple[Effect, ...] = (
             _P("line_angle", "angle_rad", "rad", -0.1, 0.1, 0.0, 0.002)),
            ("sensor",), "a place on the map", "rigid displacement of the printed course about the field's origin"),
     Effect("clock_skew", "the log's clock runs fast or slow",
-           (_P("clock_skew", "rate", "-", -0.08, 0.08, 0.0, 0.002),),
+           (_P("clock_skew", "rate", "-", -0.06, 0.06, 0.0, 0.002),),
            ("clock",), "grows with time", "log time = true time x (1 + rate)"),
     Effect("pose_delay", "camera poses are late",
            (_P("pose_delay", "time_s", "s", -0.1, 0.3, 0.0, 0.005),),
