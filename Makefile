@@ -12,7 +12,7 @@ PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 py
 	$(if $(shell $(name) -c '$(NEW_ENOUGH)' 2>/dev/null),$(name))))
 
 .DEFAULT_GOAL := help
-.PHONY: help env evolve test check format bench concealed clean
+.PHONY: help env evolve test check format bench concealed fuzz clean
 
 help:  ## Show this list
 	@echo "gecar: evolve programs for a line-following robot. Try: make evolve"
@@ -44,6 +44,9 @@ bench: $(VENV)/.cluster  ## Measure how fast gecar is, and print it as a table
 concealed: $(VENV)/.test  ## Examine gecar discover on concealed robots (hours; resumes)
 	$(PY) -m benchmarks.concealed exam --out runs/concealed --report benchmarks/concealed/RESULTS.md $(ARGS)
 
+fuzz: $(VENV)/.fuzz  ## Fuzz the readers of strangers' files, e.g. ARGS="--inputs 250000 --target grammar"
+	$(PY) -m tests.fuzz $(ARGS)
+
 clean:  ## Remove .venv and what tools leave behind; runs/ stays
 	rm -rf $(VENV) tests/node/node_modules build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -60,7 +63,7 @@ $(VENV)/.runtime: pyproject.toml | $(PY)
 	@$(PIP) install --quiet --editable .
 	@touch $@
 
-$(VENV)/.test $(VENV)/.check $(VENV)/.cluster: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
+$(VENV)/.test $(VENV)/.check $(VENV)/.cluster $(VENV)/.fuzz: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
 	@$(PIP) install --quiet --editable '.[$*]'
 	@touch $@

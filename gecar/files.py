@@ -51,6 +51,22 @@ def write_whole(path: Path, content: str | bytes, durable: bool = True) -> None:
         raise
 
 
+def is_file(path: Path) -> bool:
+    """Say whether there is such a file; names that no file can have (too long, a null in it) are none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Say whether there is such a folder, as `is_file`."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def read_text(path: Path, what: str) -> str:
     """Read a text file.
 
@@ -67,6 +83,8 @@ def read_text(path: Path, what: str) -> str:
         raise expected(path, "no such file", what) from None
     except OSError as error:
         raise expected(path, error.strerror or "an unreadable file", what) from None
+    except ValueError:  # a null in its name
+        raise expected(path, "a name that no file can have", what) from None
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

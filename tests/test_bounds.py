@@ -10,10 +10,14 @@ import pytest
 from PIL import Image
 
 from gecar.errors import InputError
-from gecar.language.grammar import parse_grammar
+from gecar.files import read_text
+from gecar.language.grammar import load_grammar, parse_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import parse_program
 from gecar.reality.recording import read_recording
+from gecar.results.config import configure
+from gecar.results.folder import read_history
+from gecar.results.guard import read_table
 from gecar.world.course import COURSES, load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate
@@ -57,3 +61,35 @@ def test_a_picture_that_unpacks_to_much_is_refused_unpacked(edge: int, tmp_path:
     (tmp_path / "course.toml").write_text("# " + "x" * 1_000_000)
     with pytest.raises(InputError, match="expected a course file of at most 1000000"):
         load_course(tmp_path / "course.toml")
+
+
+def test_a_recording_of_days_is_refused_before_a_replay_simulates_them(tmp_path: Path) -> None:
+    (tmp_path / "days.csv").write_text("t_s,left_duty_pct,right_duty_pct\n0,1,1\n1,1,1\n1e9,1,1\n")
+    with pytest.raises(
+        InputError, match=r"column t_s: found 1e\+09 s from first to last, expected at most 36000 s"
+    ):
+        read_recording(tmp_path / "days.csv")
+
+
+@pytest.mark.parametrize("name", ["x" * 5_000, "a\0b", "a\nb"])
+def test_names_that_no_file_can_have_are_refused_in_one_line(name: str) -> None:
+    for load in (load_grammar, load_course, load_robot, lambda name: configure({"preset": name})):
+        with pytest.raises(InputError, match=r"^[^\n\0]*$"):
+            load(name)
+    assert configure({"course": name}).course == name
+    with pytest.raises(InputError, match=r"^[^\n\0]*$"):
+        read_text(Path(name), "a text")
+
+
+@pytest.mark.parametrize("text", ["drive = [1]", "[[drive]]\nprogram = 5", "[[search]]\nseeds = 5",
+                                  '[[search]]\nseeds = ["a"]', "versions = 3\n[[search]]\nseeds = [1]"])  # fmt: skip
+def test_a_fitness_table_of_the_wrong_kinds_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "table.toml").write_text(text)
+    with pytest.raises(InputError, match=r"table.toml, (drive|search|versions)"):
+        read_table(tmp_path / "table.toml")
+
+
+def test_a_history_with_a_field_of_any_length_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "history.csv").write_text('generation\n"' + "1" * 200_000)
+    with pytest.raises(InputError, match="found no table"):
+        read_history(tmp_path)

@@ -143,7 +143,12 @@ def test_a_scheduler_without_workers_or_that_goes_away_is_one_line(tmp_path: Pat
             client.wait_for_workers(1, timeout=30)
         executor = open_executor("dask", 1, address)
         answer = executor.submit(time.sleep, 30)
-        time.sleep(0.3)
+        assert not executor.why_waiting()
+        worker.kill()
+        until = time.monotonic() + 20
+        while not executor.why_waiting() and time.monotonic() < until:
+            time.sleep(0.05)
+        assert executor.why_waiting().startswith(f"{address} has no worker left; waiting for one")
         scheduler.kill()
         gone = rf"--scheduler: found {address} no longer answers, expected a Dask scheduler that stays"
         with pytest.raises(InputError, match=gone):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -177,3 +178,20 @@ def test_a_candidate_is_a_program_and_a_seed_below_two_to_the_64() -> None:
     candidates: list[Candidate] = generations(Evolution(SMALL, MAPPER), 1).ask()
     assert all(0 <= candidate.seed < 2**64 for candidate in candidates)
     assert len({candidate.seed for candidate in candidates}) == len(candidates)
+
+
+def test_that_nobody_is_left_to_run_a_batch_is_told_once(monkeypatch, capsys) -> None:  # type: ignore[no-untyped-def]
+    class Deserted(SerialExecutor):
+        def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+            self.result, self.answer = super().submit(fn, *args, **kwargs).result(), Future()
+            return self.answer
+
+        def why_waiting(self) -> str:
+            threading.Timer(0.1, self.answer.set_result, [self.result]).start()
+            return "no worker is left"
+
+    monkeypatch.setattr(batches_module, "QUIET_S", 0.02)
+    asked = Evolution(SMALL, MAPPER).ask()
+    scores = Batches(toy_scores, Deserted)(asked)
+    assert np.array_equal(scores, toy_scores([c.program.opcodes for c in asked]))
+    assert capsys.readouterr().err == "no worker is left\n"

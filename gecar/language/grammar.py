@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text, shipped
+from gecar.files import is_file, is_folder, read_text, shipped
 from gecar.language.bnf import RawRule, Reference, parse_rules
 from gecar.language.place import place, plain
 
@@ -200,14 +200,14 @@ def load_grammar(name: str | Path, ranges: Mapping[str, int] | None = None) -> G
         If there is no such grammar, or as `parse_grammar`.
     """
     path = Path(name)
-    if path.is_file():
+    if is_file(path):
         return read_grammar(path, ranges)
     for folder in _folders():
         named = folder / (path.name if path.suffix == ".bnf" else f"{path.name}.bnf")
-        if path.parent == Path() and named.exists():
+        if path.parent == Path() and is_file(named):
             return read_grammar(named, ranges)
-    if path.exists():
-        return read_grammar(path, ranges)  # a folder, say: the error says so
+    if is_folder(path):
+        return read_grammar(path, ranges)  # the error says so
     raise expected(
         "grammar",
         f"no file or grammar {str(name)!r}",

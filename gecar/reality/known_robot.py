@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gecar.errors import expected
-from gecar.files import read_toml
+from gecar.files import is_file, read_toml
 from gecar.reality.recording import Recording
 from gecar.world.robot import Robot, load_robot, robot_from
 
@@ -25,7 +25,7 @@ def known_robot(recording: Recording) -> Robot:
         If the file is missing or wrong.
     """
     name = recording.setup.robot
-    if recording.setup.rig != "bench" or not Path(name).is_file():
+    if recording.setup.rig != "bench" or not is_file(Path(name)):
         return load_robot(name)
     table = read_toml(Path(name), "a robot file")
     if "body" in table:

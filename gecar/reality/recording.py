@@ -18,6 +18,8 @@ from gecar.reality.columns import COLUMNS, Series
 from gecar.reality.csv_table import read_table
 from gecar.reality.setup import Setup, read_setup, setup_toml
 
+LONGEST_S = 36_000.0  # a replay simulates every millisecond between two rows, however few there are
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -200,3 +202,6 @@ def _check_time(name: str, time: Series) -> None:
         raise expected(
             f"{name}, line {k + 3}, column t_s", f"{time[k + 1]:g} after {time[k]:g}", "an increasing time"
         )
+    if len(time) and time[-1] - time[0] > LONGEST_S:
+        found = f"{time[-1] - time[0]:g} s from first to last"
+        raise expected(f"{name}, column t_s", found, f"at most {LONGEST_S:g} s, times being in seconds")

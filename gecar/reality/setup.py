@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text, read_toml
+from gecar.files import is_file, read_text, read_toml
 
 RIGS = ("floor", "bench")
 
@@ -131,9 +130,9 @@ def _text(path: Path, found: Mapping[str, Any], key: str, default: str) -> str:
 
 def _name_or_path(path: Path, key: str, value: str) -> str:
     """Return a name as it stands, and a path absolute: relative ones are meant from the TOML's folder."""
-    target = (path.parent / value).resolve()
-    if target.is_file():
-        return str(target)
+    target = path.parent / value
+    if is_file(target):
+        return str(target.resolve())
     if value.endswith(".toml") or "/" in value or "\\" in value:
         raise expected(
             f"{path}, {key}", f"{value!r}, no such file", f"a {key} file, relative to this TOML, or a name"
@@ -178,5 +177,5 @@ def _noise(path: Path, found: object, factors: Mapping[str, tuple[str, float]]) 
         if column not in factors:
             raise expected(f"{path}, noise", f"the column {column!r}", f"one of {', '.join(factors)}")
         to, factor = factors[column]
-        noise[to] = _number(f"{path}, noise.{column}", value, 0.0, math.inf) * factor
+        noise[to] = _number(f"{path}, noise.{column}", value, 0.0, 1e9) * factor
     return MappingProxyType(noise)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gecar.errors import InputError, expected
-from gecar.files import read_toml
+from gecar.files import is_file, read_toml
 from gecar.language.mapping import MappingOptions
 from gecar.search.executors import MAX_WORKERS, usable_cores
 from gecar.search.robust import Summary
@@ -160,7 +160,7 @@ def _pairs(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[tuple[str
 def _place(name: str) -> str:
     """Make a file's name hold wherever it is read again; other names stay."""
     path = Path(name)
-    return str(path.resolve()) if path.is_file() else name
+    return str(path.resolve()) if is_file(path) else name
 
 
 def _toml(value: Any) -> str:

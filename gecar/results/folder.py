@@ -184,7 +184,10 @@ def read_history(folder: Path) -> dict[str, npt.NDArray[np.float64]]:
         If it is missing, has no row, lacks a column, or holds something that is no number; names the line.
     """
     path = folder / "history.csv"
-    rows = list(csv.reader(read_text(path, "a run's history").splitlines()))
+    try:
+        rows = list(csv.reader(read_text(path, "a run's history").splitlines()))
+    except csv.Error as error:  # a quote that does not end takes in more than a field may hold
+        raise expected(path, f"no table ({error})", "a run's history") from None
     names = rows[0] if rows else []
     missing = [name for name in REQUIRED if name not in names]
     if missing or len(rows) < 2:

@@ -97,12 +97,23 @@ def read_table(path: Path) -> FitnessTable:
     drives, searches = table.get("drive", []), table.get("search", [])
     if unknown or not isinstance(drives, list) or not isinstance(searches, list) or not drives + searches:
         raise expected(path, f"{sorted(unknown) or 'nothing to run'}", "[versions], [[drive]] and [[search]]")
+    if not isinstance(table.get("versions", {}), dict):
+        raise expected(f"{path}, versions", repr(table["versions"])[:40], "a table: library = version")
     for kind, rows, needed in (("drive", drives, "program"), ("search", searches, "seeds")):
         for k, row in enumerate(rows, 1):
-            if not row.get(needed):
-                raise expected(f"{path}, {kind} {k}", f"no {needed}", f"a row with {needed}")
-            config_of(row, f"{path}, {kind} {k}")
+            _check_row(row, needed, f"{path}, {kind} {k}")
     return FitnessTable(table.get("versions", {}), tuple(drives), tuple(searches))
+
+
+def _check_row(row: object, needed: str, where: str) -> None:
+    if not isinstance(row, dict) or not row.get(needed):
+        raise expected(where, f"no {needed}", f"a row with {needed}")
+    if needed == "program" and not isinstance(row[needed], str):
+        raise expected(f"{where}, program", repr(row[needed])[:40], "a program's text")
+    if needed == "seeds" and not isinstance(row[needed], list):
+        raise expected(f"{where}, seeds", repr(row[needed])[:40], "a list of seeds")
+    for seed in row[needed] if needed == "seeds" else (1,):
+        config_of(row, where, seed)
 
 
 def config_of(row: Row, where: str = "row", seed: int = 1) -> Config:

@@ -167,7 +167,7 @@ def read_study(folder: Path) -> Study:
         return Study(
             dict(table["base"]), dict(table["changes"]), rows, columns, tuple(map(int, table["seeds"]))
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise expected(path, f"no study ({error})", "what gecar table wrote") from None
 
 

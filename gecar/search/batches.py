@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from contextlib import suppress
 from types import TracebackType
 from typing import Self
@@ -25,6 +25,9 @@ SHORTEST_S = 0.002
 """Shortest batch aimed at: sending one through a process pool costs about 0.2 ms."""
 MAX_DEATHS = 3
 """How often in a row workers may die without finishing anything."""
+
+QUIET_S = 30.0
+"""How long a batch may be away before the executor is asked whether anybody is there to run it [s]."""
 
 _EMPTY = np.zeros((0, N_COLUMNS), np.int32)
 
@@ -132,11 +135,22 @@ class Batches:
         try:
             for k, future in futures.items():
                 with suppress(BrokenExecutor):
-                    done[k] = future.result()
+                    done[k] = self._await(future)
         finally:
             for future in futures.values():  # after Ctrl-C nobody wants the rest; those done do not mind
                 future.cancel()
         return done
+
+    def _await(self, future: Future[Scored]) -> Scored:
+        """Wait for a batch; say so, once, if nobody is there to run it."""
+        told = False
+        while not future.done():
+            wait([future], timeout=QUIET_S)
+            why = "" if told or future.done() else getattr(self._executor, "why_waiting", str)()
+            if why:
+                told = True
+                print(why, file=sys.stderr, flush=True)
+        return future.result()
 
     def _recover(self, lost: int, deaths: int) -> None:
         self.close()

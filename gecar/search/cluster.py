@@ -71,6 +71,13 @@ class DaskExecutor(Executor):
                 if each is not None:
                     each.close(timeout=5)
 
+    def why_waiting(self) -> str:
+        """Return a sentence if no worker is left; Dask waits until one comes."""
+        with suppress(OSError):  # a scheduler that goes away meanwhile is told of by the batches
+            if self._client.status != "running" or sum(self._client.ncores().values()):
+                return ""
+        return f"{self._where} has no worker left; waiting for one (dask worker ADDRESS), Ctrl-C ends the run"
+
     def _connect(self, scheduler: str, workers: int) -> Any:
         try:
             if not scheduler:

@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text, shipped
+from gecar.files import is_file, read_text, shipped
 from gecar.world import line, raster
 from gecar.world.course_file import validate
 from gecar.world.course_parts import parts_from
@@ -211,7 +211,7 @@ def load_course(name_or_path: str | Path) -> Course:
         If there is no such course, or its file is wrong; one line that names the field.
     """
     path = Path(name_or_path)
-    if path.suffix != ".toml" and not path.is_file():
+    if path.suffix != ".toml" and not is_file(path):
         if str(name_or_path) not in list_courses():
             raise expected(
                 "--course",
@@ -219,7 +219,7 @@ def load_course(name_or_path: str | Path) -> Course:
                 f"a course file (.toml) or one of {', '.join(list_courses())}",
             )
         path = COURSES / f"{name_or_path}.toml"
-    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
+    if is_file(path) and path.stat().st_size > _LARGEST_FILE:
         raise expected(path, f"{path.stat().st_size} bytes", f"a course file of at most {_LARGEST_FILE}")
     return parse_course(read_text(path, "a course file"), str(path))
 

@@ -48,7 +48,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, mode
 
 from gecar.errors import InputError, expected
 
-_Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+_Number = Annotated[float, Strict(), Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 _Positive = Annotated[float, Strict(), Field(gt=0, le=1e6, allow_inf_nan=False)]
 _Level = Annotated[float, Strict(), Field(ge=0, le=255, allow_inf_nan=False)]
 _Index = Annotated[int, Strict(), Field(ge=0, le=1_000_000)]

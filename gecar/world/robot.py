@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from gecar.errors import InputError, expected
-from gecar.files import read_toml, write_whole
+from gecar.files import is_file, read_toml, write_whole
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS, Parameter
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -233,10 +233,10 @@ def load_robot(name_or_path: str | Path) -> Robot:
         If there is no such robot, or its file is wrong.
     """
     path = Path(name_or_path)
-    if path.suffix == ".toml" or path.is_file():
+    if path.suffix == ".toml" or is_file(path):
         return read_robot(path)
     shipped = Path(__file__).parent / f"{name_or_path}.toml"
-    if not shipped.is_file():
+    if not is_file(shipped):
         raise expected("--robot", f"'{name_or_path}'", "a robot file (.toml) or 'ev3'")
     return read_robot(shipped)
 
