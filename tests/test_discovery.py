@@ -32,6 +32,7 @@ from gecar.reality.recording import Case, Recording, make_recording, read_case, 
 from gecar.reality.replay import Film
 from gecar.reality.rough_search import rough_search
 from gecar.reality.setup import Setup
+from gecar.reality.starts import starts
 from gecar.reality.verdict import Judgement, Residual, Verdict
 from gecar.reality.whiteness import whiteness
 from gecar.report.verdict import sentences
@@ -102,6 +103,17 @@ def test_what_a_missing_effect_leaves_on_a_bench_is_not_white() -> None:
     evidence = verdict_on("viscous_friction", "coefficient_nms", 0.004, rig="bench").evidence
     assert not whiteness(evidence.motion, evidence.motion.nothing)[0]
     assert whiteness(evidence.motion, evidence.moved.taken)[0]
+
+
+@pytest.mark.parametrize(("share", "first"), [(1.0, 0.3), (0.01, 0.0)])
+def test_breakaway_friction_is_looked_for_within_the_speeds_recorded(share: float, first: float) -> None:
+    run = recorded(EV3, 1, rig="bench")
+    slow = replace(
+        run, left_angle_rad=run.left_angle_rad * share, right_angle_rad=run.right_angle_rad * share
+    )
+    speeds = [start["speed_rad_s"] for start in starts("static_friction", EV3, [slow])]
+    assert min(speeds) == pytest.approx(first, abs=0.1)
+    assert max(speeds) == pytest.approx(3.0) if first else max(speeds) < 0.3
 
 
 def test_a_bench_needs_no_camera() -> None:

@@ -21,6 +21,7 @@ Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
 
 LEAST_CYCLES = 2.0
+SPEED_OVER_S = 0.1
 _SIZES = (3.0, 12.0)  # in steps worth a name
 
 
@@ -47,10 +48,19 @@ def _sizes(c: Coordinate) -> Iterator[float]:
                 yield c.value(side)
 
 
-def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
-    for speed in (0.3, 1.0, 3.0):
+def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
+    """Begin within the speeds recorded: above them breakaway friction is dry friction, and slopes lead nowhere."""
+    top = max(_top_speed(r) for r in recordings)
+    for speed, share in ((0.3, 0.25), (1.0, 0.5), (3.0, 1.0)):
         for torque in (0.005, 0.02):
-            yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": speed}
+            yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": min(speed, share * top)}
+
+
+def _top_speed(recording: Recording) -> float:
+    """Return the fastest a shaft turned over `SPEED_OVER_S` [rad/s]."""
+    every = max(int(np.searchsorted(recording.t_s, recording.t_s[0] + SPEED_OVER_S)), 1)
+    angles, t = _known(recording)[::every], recording.t_s[::every]
+    return float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None], initial=0.0))
 
 
 def _torque_scale(robot: Robot) -> float:
