@@ -63,6 +63,12 @@ def test_a_picture_that_unpacks_to_much_is_refused_unpacked(edge: int, tmp_path:
         load_course(tmp_path / "course.toml")
 
 
+def test_a_cell_of_strange_blanks_is_named(tmp_path: Path) -> None:
+    (tmp_path / "blanks.csv").write_bytes(b"t_s,left_duty_pct,right_duty_pct\n0,1,1\n1,\r\r,1\n")
+    with pytest.raises(InputError, match=r"line 3, column left_duty_pct: found '\\r\\r', expected a number"):
+        read_recording(tmp_path / "blanks.csv")
+
+
 def test_a_recording_of_days_is_refused_before_a_replay_simulates_them(tmp_path: Path) -> None:
     (tmp_path / "days.csv").write_text("t_s,left_duty_pct,right_duty_pct\n0,1,1\n1,1,1\n1e9,1,1\n")
     with pytest.raises(

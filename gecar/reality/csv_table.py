@@ -115,13 +115,13 @@ def _bad_field(path: Path, lines: list[str], first: int, names: list[str]) -> In
         for name, text in zip(names, line.split(","), strict=True):
             if not _is_number(text):
                 return expected(
-                    f"{path}, line {first + k}, column {name}", repr(text.strip()), "a number or nothing"
+                    f"{path}, line {first + k}, column {name}", repr(text.strip(" \t")), "a number or nothing"
                 )
     raise AssertionError("every field is a number after all")
 
 
 def _is_number(text: str) -> bool:
     try:
-        return not text.strip() or (not _NOT_A_NUMBER.search(text) and math.isfinite(float(text)))
+        return not _NOT_A_NUMBER.search(text) and (not text.strip() or math.isfinite(float(text)))
     except ValueError:
         return False
