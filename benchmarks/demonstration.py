@@ -26,7 +26,7 @@ from gecar.language.program import read_program
 from gecar.report.table import piped
 
 TRIALS = 5
-MOST_SEEDS = 20
+SEEDS = 5
 SEARCH = ("--preset", "paper", "--noise", "2", "--motor-noise", "3", "--no-pictures", "--quiet")
 HELD = ("trial_4", "trial_5", "run_07_reversals", "run_08_line_smooth")
 
@@ -45,23 +45,24 @@ def drives(run: Path, into: Path) -> list[Round]:
     return [drive(rows, PAPER_LIKE, START, k, into / f"trial_{k + 1}.csv") for k in range(TRIALS)]
 
 
-def first_that_arrives(out: Path, name: str, *more: str | Path) -> tuple[Path, Path, list[int]]:
-    """Evolve with one seed after the other until a program arrives on the concealed robot, too.
+def fastest_that_arrives(out: Path, name: str, *more: str | Path) -> tuple[Path, Path, int]:
+    """Evolve with several seeds, and let their programs drive, the fastest in simulation first, until one arrives.
 
     Returns
     -------
     tuple
-        The run, its trials' folder, and the seeds whose programs did not arrive in all trials.
+        The run, its trials' folder, and how many before it did not arrive in all trials.
     """
-    failed: list[int] = []
-    for seed in range(1, MOST_SEEDS + 1):
-        run, trials = out / f"{name}_{seed}", out / f"{name}_{seed}_trials"
+    runs = [out / f"{name}_{seed}" for seed in range(1, SEEDS + 1)]
+    for seed, run in enumerate(runs, 1):
         if not (run / "result.json").exists():
             gecar("evolve", *SEARCH, *more, "--seed", str(seed), "--out", run)
+    fitness = {run: json.loads((run / "result.json").read_text())["fitness_s"] for run in runs}
+    for failed, run in enumerate(sorted(runs, key=fitness.__getitem__)):
+        trials = out / f"{run.name}_trials"
         if all(r.outcome == "goal" for r in drives(run, trials)):
             return run, trials, failed
-        failed.append(seed)
-    raise SystemExit(f"none of {MOST_SEEDS} programs arrived on the concealed robot")
+    raise SystemExit(f"none of {SEEDS} programs arrived on the concealed robot")
 
 
 def scripts(into: Path) -> None:
@@ -92,14 +93,14 @@ def main() -> None:
     parser = ArgumentParser(prog="python -m benchmarks.demonstration", description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     out: Path = parser.parse_args().out
-    run, trials, failed = first_that_arrives(out, "nominal")
+    run, trials, failed = fastest_that_arrives(out, "nominal")
     before = gecar("compare", trials, "--program", run, "--out", out / "before")
     scripts(trials)
     verdict = gecar("discover", trials, "--holdout", ",".join(HELD), "--out", out / "verdict")
     corrected = out / "verdict/robot.toml"
     only = [trials / f"trial_{k + 1}.csv" for k in range(TRIALS)]
     after = gecar("compare", *only, "--program", run, "--robot", corrected, "--out", out / "after")
-    again, its_trials, failed_again = first_that_arrives(out, "corrected", "--robot", corrected)
+    again, its_trials, failed_again = fastest_that_arrives(out, "corrected", "--robot", corrected)
     new = gecar("compare", its_trials, "--program", again, "--robot", corrected, "--out", out / "again")
     heads = ["program, simulated robot", "simulated [s]", "driven [s]", "late", "correlation x", "y"]
     lines = [
@@ -109,8 +110,8 @@ def main() -> None:
     ]
     found = ", ".join(effect["id"] for effect in verdict["effects"])
     words = (
-        f"Found: {found}. Programs that did not arrive on the concealed robot before one did: {len(failed)} of those "
-        f"evolved on the nominal robot, {len(failed_again)} of those evolved on the corrected one."
+        f"Found: {found}. Of {SEEDS} programs each, the fastest in simulation drove first, and the next where it did "
+        f"not arrive in all trials: {failed} evolved on the nominal robot did not, {failed_again} on the corrected one."
     )
     text = f"{piped([heads, *lines])}\n\n{words}\n"
     write_whole(out / "table.md", text)
