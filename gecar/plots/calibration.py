@@ -7,7 +7,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from gecar.plots.style import BLUE, FAINT, GREEN, INK, LIGHT, SOFT, VERMILION, headline, look, new_figure
+from gecar.plots.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    LIGHT,
+    SOFT,
+    VERMILION,
+    headline,
+    log_ticks,
+    look,
+    new_figure,
+)
 from gecar.reality.calibration import Calibration, Fitted, Unknown
 from gecar.reality.identifiable import BLIND
 
@@ -78,7 +90,7 @@ def _misfits(axes: Axes, result: Calibration) -> None:
         axes.plot(before, row, "o", color=VERMILION, markersize=5, label="before" if row == 0 else None)
         axes.plot(after, row, "o", color=GREEN, markersize=5, label="after" if row == 0 else None)
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    log_ticks(axes.xaxis)
     axes.set_xlabel("NRMSE of angles and pose   (yellow: held out)")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2, handletextpad=0.1)
     _rows(axes, list(shown), [INK] * len(shown))

@@ -23,6 +23,7 @@ from gecar.plots.style import (
     SOFT,
     VERMILION,
     headline,
+    log_ticks,
     look,
     new_figure,
 )
@@ -175,6 +176,7 @@ def _misfits(axes: Axes, trials: Sequence[Trial]) -> None:
     axes.set_yticks(range(len(columns)), [c.replace("_", " ").rsplit(" ", 1)[0] for c in columns])
     axes.set_ylim(len(columns) - 0.4, -0.6)
     axes.set_xscale("log")
+    log_ticks(axes.xaxis)
     axes.axvline(1.0, color=SOFT, linewidth=0.8)
     axes.set_xlabel("NRMSE  (1: as bad as a constant)")
     axes.tick_params(axis="y", length=0)

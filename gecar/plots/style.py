@@ -10,7 +10,9 @@ from typing import Any
 
 import matplotlib as mpl
 from cycler import cycler
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from gecar.errors import expected
 from gecar.files import write_whole
@@ -86,6 +88,13 @@ def headline(figure: Figure, title: str, detail: str = "") -> None:
             va="top",
             transform=figure.dpi_scale_trans,
         )
+
+
+def log_ticks(axis: Axis) -> None:
+    """Label a logarithmic axis 0.1, 0.2, 0.5, 1 and so on, and nothing between."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def settle(figure: Figure) -> None:
