@@ -93,8 +93,13 @@ def test_a_verdict_closes_the_gap_on_recordings_it_never_fitted() -> None:
     assert verdict.judgement.gap_closed > 0.9
 
 
-def test_the_gap_closed_counts_every_channel() -> None:
-    channels = {"x_m": Misfit(1.0, 0.2, 0.1), "heading_deg": Misfit(0.12, 0.18, 0.1)}
+def test_the_gap_closed_counts_channels_made_worse_and_not_those_that_show_noise_alone() -> None:
+    noise_alone = Misfit(1.0, 1.0, 0.9)
+    channels = {
+        "x_m": Misfit(1.0, 0.2, 0.1),
+        "heading_deg": Misfit(0.12, 0.18, 0.1),
+        "battery_v": noise_alone,
+    }
     judged = Judgement(("run_07",), False, channels)
     assert judged.gap_closed == pytest.approx((1.12 - 0.38) / (1.12 - 0.2))
 

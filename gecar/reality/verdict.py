@@ -107,13 +107,14 @@ class Judgement:
 
     @property
     def gap_closed(self) -> float | None:
-        """Share of the gap to the floor that is closed: (before - after) / (before - floor), of the means above.
+        """Share of the gap to the floor that is closed; None where no channel has a gap to speak of.
 
-        None where no channel has a gap to speak of.
+        (before - after) / (before - floor), each summed over the channels that have a gap before or after: one that
+        shows noise alone has nothing to close, one that is made worse counts.
         """
-        gap = self.before - self.floor
-        seen = any(m.before > VISIBLE * m.floor for m in self.channels.values())
-        return (self.before - self.after) / gap if seen and gap > 0.0 else None
+        seen = [m for m in self.channels.values() if max(m.before, m.after) > VISIBLE * m.floor]
+        gap = sum(m.before - m.floor for m in seen)
+        return sum(m.before - m.after for m in seen) / gap if gap > 0.0 else None
 
 
 @dataclass(frozen=True)
