@@ -123,6 +123,9 @@ class Truth:
             if tick % turn_ticks == 0:
                 command = controller(time_s, int(log.readings[tick]))
                 if command is None or (ended is not None and ended(log.pose[tick, 0], log.pose[tick, 1])):
+                    log.terminal_v[tick] = log.terminal_v[
+                        max(tick - 1, 0)
+                    ]  # nothing is asked of the battery any more
                     return _finished(log.until(tick + 1))
             log.commands[tick] = command
             log.terminal_v[tick] = self._push(train, state, command, time_s)
