@@ -4,7 +4,7 @@ python -m benchmarks.better_search ablation --out runs/ablation      the paper's
 python -m benchmarks.better_search courses --out runs/courses        every course: the paper's search and the better one
 
 Both go on where they were stopped, and write table.md into their folder: 20 seeds from 1 up, 10,200 evaluations a run.
-Its operators were shortlisted on seeds 1 to 6 of the paper's course, its numbers chosen with seeds from 1001 up.
+The preset's operators were shortlisted on seeds 1 to 6 of the paper's course, its numbers on seeds from 1001 up.
 """
 
 from __future__ import annotations
