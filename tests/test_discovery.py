@@ -26,6 +26,7 @@ from gecar.reality.comparison import Strip
 from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
 from gecar.reality.formula import NAMES, Formula, describe
+from gecar.reality.freedom import free
 from gecar.reality.holdout import Misfit, split
 from gecar.reality.noise import estimate_noise
 from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
@@ -37,6 +38,7 @@ from gecar.reality.verdict import Judgement, Residual, Verdict
 from gecar.reality.whiteness import whiteness
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_page
+from gecar.world.effects import CATALOGUE
 from gecar.world.robot import Robot, load_robot
 
 EV3 = load_robot("ev3")
@@ -119,6 +121,19 @@ def test_breakaway_friction_is_looked_for_within_the_speeds_recorded(share: floa
     speeds = [start["speed_rad_s"] for start in starts("static_friction", EV3, [slow])]
     assert min(speeds) == pytest.approx(first, abs=0.1)
     assert max(speeds) == pytest.approx(3.0) if first else max(speeds) < 0.3
+
+
+@pytest.mark.parametrize(
+    "missing", [("left_angle_rad", "right_angle_rad"), ("x_m", "y_m", "heading_rad"), ("reflection_pct",)]
+)
+def test_every_effect_has_places_to_start_from_whichever_columns_are_missing(
+    missing: tuple[str, ...],
+) -> None:
+    run = recorded(EV3, 1)
+    blind = replace(run, **{name: np.full_like(getattr(run, name), np.nan) for name in missing})
+    for effect in CATALOGUE:
+        freedom = free(EV3, [effect.id])
+        assert all(np.isfinite(freedom.vector({effect.id: s})).all() for s in starts(effect.id, EV3, [blind]))
 
 
 def test_a_bench_needs_no_camera() -> None:

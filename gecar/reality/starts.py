@@ -49,8 +49,11 @@ def _sizes(c: Coordinate) -> Iterator[float]:
 
 
 def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
-    """Begin within the speeds recorded: above them breakaway friction is dry friction, and slopes lead nowhere."""
-    top = max(_top_speed(r) for r in recordings)
+    """Begin within the speeds recorded: above them breakaway friction is dry friction, and slopes lead nowhere.
+
+    Where no shaft was recorded turning, any speed will do.
+    """
+    top = max(_top_speed(r) for r in recordings) or math.inf
     for speed, share in ((0.3, 0.25), (1.0, 0.5), (3.0, 1.0)):
         for torque in (0.005, 0.02):
             yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": min(speed, share * top)}
