@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.studies import performed, planned
+from benchmarks.studies import add_seeds, performed, planned, seeds_of
 from gecar.files import write_whole
 from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell
@@ -111,22 +111,18 @@ def main() -> None:
     """Perform one of the two studies and print its table."""
     parser = ArgumentParser(prog="python -m benchmarks.better_search", description=__doc__)
     parser.add_argument("study", choices=("ablation", "courses"))
-    parser.add_argument("--seeds", type=int, default=20)
+    add_seeds(parser, 20)
     parser.add_argument("--grammar", default="paper")
     parser.add_argument("--courses", nargs="+", default=None)
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     if asked.study == "ablation":
-        cells = performed(
-            planned(asked.courses or ["paper"], searches(), asked.seeds, asked.grammar), asked.out
-        )
-        table = ablation_table(cells)
+        runs = planned(asked.courses or ["paper"], searches(), seeds_of(asked), asked.grammar)
+        table = ablation_table(performed(runs, asked.out))
     else:
         pair = {REFERENCE: {"preset": "better"}, "paper": {"preset": "paper"}}
-        cells = performed(
-            planned(asked.courses or list_courses(), pair, asked.seeds, asked.grammar), asked.out
-        )
-        table = courses_table(cells)
+        runs = planned(asked.courses or list_courses(), pair, seeds_of(asked), asked.grammar)
+        table = courses_table(performed(runs, asked.out))
     write_whole(asked.out / "table.md", table)
     print(table)
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.studies import performed, planned
+from benchmarks.studies import add_seeds, performed, planned, seeds_of
 from gecar.files import write_whole
 from gecar.language.program import parse_program
 from gecar.report.table import piped, seconds
@@ -68,11 +68,11 @@ def table(cells: Sequence[Cell]) -> str:
 def main() -> None:
     """Perform the study and print its table."""
     parser = ArgumentParser(prog="python -m benchmarks.robustness", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10)
+    add_seeds(parser, 10)
     parser.add_argument("--course", default="paper")
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
-    text = table(performed(planned([asked.course], SEARCHES, asked.seeds, "paper"), asked.out))
+    text = table(performed(planned([asked.course], SEARCHES, seeds_of(asked), "paper"), asked.out))
     write_whole(asked.out / "table.md", text)
     print(text)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,24 @@ from gecar.results.study import Planned, StudyFolder
 from gecar.search.executors import usable_cores
 
 
+def add_seeds(parser: ArgumentParser, seeds: int) -> None:
+    """Let a study be asked for its seeds, e.g. for fresh ones."""
+    parser.add_argument("--seeds", type=int, default=seeds, help="runs of each kind (%(default)s)")
+    parser.add_argument("--first-seed", type=int, default=1, help="(%(default)s)")
+
+
+def seeds_of(asked: Namespace) -> range:
+    """Return the seeds asked for."""
+    return range(asked.first_seed, asked.first_seed + asked.seeds)
+
+
 def planned(
-    courses: Sequence[str], chosen: Mapping[str, Mapping[str, Any]], seeds: int, grammar: str
+    courses: Sequence[str], chosen: Mapping[str, Mapping[str, Any]], seeds: Iterable[int], grammar: str
 ) -> list[Planned]:
     """Return all runs, seed after seed."""
     return [
         Planned(course, name, configure({**fields, "course": course, "grammar": grammar, "seed": seed}))
-        for seed in range(1, seeds + 1)
+        for seed in seeds
         for course in courses
         for name, fields in chosen.items()
     ]
