@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,7 +20,9 @@ SMALL = Settings(population=20, generations=6, codons=60)
 N_ARRIVALS = 3
 
 
-def toy_scores(programs: Sequence[Opcodes], seeds: Sequence[int] = (), n_arrivals: int = 0) -> Scores:
+def toy_scores(
+    programs: Sequence[Opcodes], seeds: Sequence[int] = (), to_beat_s: float = math.inf, n_arrivals: int = 0
+) -> Scores:
     """Score programs by a rugged function of all their numbers; half of them fail. In the place of a simulation."""
     scores = np.zeros(len(programs), score_type(n_arrivals))
     for score, opcodes in zip(scores, programs, strict=True):

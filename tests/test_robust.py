@@ -14,6 +14,7 @@ from gecar.world.rollout import Outcome, World
 
 WORLD = World(load_robot("ev3"), load_course("paper"))
 SOLVES = parse_program("if(SensorValue > 85):\n    motor(70,70,10)\nelse:\n    motor(50,-50,190)\n").opcodes
+SLOW = parse_program("if(SensorValue > 50):\n    motor(40,60,10)\nelse:\n    motor(30,-30,30)\n").opcodes
 LEAVES = parse_program("motor(80,80,100)").opcodes
 
 
@@ -28,6 +29,22 @@ def test_the_first_robot_that_fails_ends_the_race():
     assert failed["fitness_s"] == UNSOLVED
     assert failed["steps"] < 1500
     assert 0.0 <= failed["share"] < 0.1
+
+
+@pytest.mark.parametrize("summary", ["mean", "worst"])
+def test_a_program_far_behind_the_best_is_not_driven_on_by_all(summary):
+    evaluator = RobustEvaluator(WORLD, 4, summary)
+    whole = evaluator([SLOW], [1])[0]
+    behind = evaluator([SLOW], [1], whole["fitness_s"] / 1.2)[0]
+    assert behind["steps"] < whole["steps"]
+    assert whole["fitness_s"] / 1.1 < behind["fitness_s"] < UNSOLVED
+
+
+def test_a_program_that_may_be_the_best_is_driven_by_all():
+    evaluator = RobustEvaluator(WORLD, 4)
+    whole = evaluator([SLOW], [1])[0]
+    assert whole["fitness_s"] < UNSOLVED
+    assert evaluator([SLOW], [1], whole["fitness_s"] / 1.04)[0] == whole
 
 
 def test_worst_is_no_better_than_mean_and_a_nominal_winner_may_fail():

@@ -42,7 +42,7 @@ class Mortal:
     mark: Path
     always: bool = False
 
-    def __call__(self, programs: Sequence[Opcodes], _seeds: Sequence[int]) -> Scores:
+    def __call__(self, programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float) -> Scores:
         if programs and (self.always or not self.mark.exists()):
             self.mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -53,7 +53,7 @@ class Mortal:
 class Faulty:
     """An evaluator with a fault."""
 
-    def __call__(self, _programs: Sequence[Opcodes], _seeds: Sequence[int]) -> Scores:
+    def __call__(self, _programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float) -> Scores:
         raise ZeroDivisionError
 
 
@@ -108,7 +108,7 @@ def test_only_lost_batches_run_again() -> None:
 
     class Breaking(SerialExecutor):
         def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
-            calls.append(len(args[1]))
+            calls.append(len(args[1].programs))
             if len(calls) == 3:
                 raise BrokenExecutor
             return super().submit(fn, *args, **kwargs)

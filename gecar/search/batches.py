@@ -14,7 +14,7 @@ import numpy as np
 
 from gecar.errors import InputError
 from gecar.language.opcodes import N_COLUMNS
-from gecar.search.evaluation import Evaluator, Opcodes, Scored, recipe, score_batch
+from gecar.search.evaluation import Batch, Evaluator, Scored, recipe, score_batch
 from gecar.search.executors import SerialExecutor
 from gecar.search.fitness import Scores
 from gecar.search.state import Candidate
@@ -72,7 +72,7 @@ class Batches:
 
     def warm(self) -> None:
         """Start the workers and let each load what it needs, before the clock runs."""
-        self._run([([_EMPTY], [0])] * self.workers)
+        self._run([Batch([_EMPTY], [0])] * self.workers)
 
     def __call__(self, candidates: Sequence[Candidate]) -> Scores:
         """Return a score for each candidate.
@@ -82,8 +82,7 @@ class Batches:
         InputError
             If workers die again and again.
         """
-        programs, seeds = [c.program.opcodes for c in candidates], [c.seed for c in candidates]
-        done = self._run([(programs[piece], seeds[piece]) for piece in self._cut(len(candidates))])
+        done = self._run([_batch(candidates[piece]) for piece in self._cut(len(candidates))])
         seconds = sum(scored.seconds for scored in done)
         self.busy_s += seconds
         if candidates:
@@ -110,7 +109,7 @@ class Batches:
             begin = end
         return pieces
 
-    def _run(self, batches: list[tuple[Sequence[Opcodes], Sequence[int]]]) -> list[Scored]:
+    def _run(self, batches: list[Batch]) -> list[Scored]:
         """Run the batches, those that were lost with their worker again; in the order given."""
         done: dict[int, Scored] = {}
         deaths = 0
@@ -123,15 +122,15 @@ class Batches:
                 self._recover(len(batches) - len(done), deaths)
         return [done[k] for k in range(len(batches))]
 
-    def _attempt(self, batches: dict[int, tuple[Sequence[Opcodes], Sequence[int]]]) -> dict[int, Scored]:
+    def _attempt(self, batches: dict[int, Batch]) -> dict[int, Scored]:
         """Run batches; return those whose worker lived."""
         if self._executor is None:
             self._executor = self._open()
         futures: dict[int, Future[Scored]] = {}
         done: dict[int, Scored] = {}
         with suppress(BrokenExecutor):  # batches not sent are lost like those of the worker that died
-            for k, (programs, seeds) in batches.items():
-                futures[k] = self._executor.submit(score_batch, self._recipe, programs, seeds)
+            for k, batch in batches.items():
+                futures[k] = self._executor.submit(score_batch, self._recipe, batch)
         try:
             for k, future in futures.items():
                 with suppress(BrokenExecutor):
@@ -165,3 +164,9 @@ class Batches:
             file=sys.stderr,
             flush=True,
         )
+
+
+def _batch(candidates: Sequence[Candidate]) -> Batch:
+    """Pack candidates; those of one generation have the same fitness to beat."""
+    to_beat_s = candidates[0].to_beat_s if candidates else math.inf
+    return Batch([c.program.opcodes for c in candidates], [c.seed for c in candidates], to_beat_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import pickle
 import threading
 import time
@@ -18,9 +19,10 @@ from gecar.search.fitness import UNSOLVED, Scores, score_type
 from gecar.world.rollout import Drive, Driver, Outcome, World
 
 Opcodes = npt.NDArray[np.int32]
-Evaluator = Callable[[Sequence[Opcodes], Sequence[int]], Scores]
-"""What scores programs (opcodes, and a seed of the noise for each). It must pickle, and always give a program the
-same score with the same seed, whichever other programs stand beside it."""
+Evaluator = Callable[[Sequence[Opcodes], Sequence[int], float], Scores]
+"""What scores programs: opcodes, a seed of the noise for each, and the best fitness so far [s]; programs far behind
+that may be scored roughly. It must pickle, and always give a program the same score with the same seed and the same
+fitness to beat, whichever other programs stand beside it."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,12 @@ class DriveEvaluator:
     world: World
     keep_arrivals: bool = False
 
-    def __call__(self, programs: Sequence[Opcodes], seeds: Sequence[int]) -> Scores:
+    def __call__(
+        self,
+        programs: Sequence[Opcodes],
+        seeds: Sequence[int],
+        to_beat_s: float = math.inf,  # noqa: ARG002  one drive is never broken off
+    ) -> Scores:
         """Return a score for each program, dtype `score_type`."""
         scores = np.zeros(len(programs), score_type(self.n_arrivals))
         for i, (opcodes, seed) in enumerate(zip(programs, seeds, strict=True)):
@@ -108,8 +115,16 @@ class Scored(NamedTuple):
     seconds: float
 
 
-def score_batch(packed: Recipe, programs: Sequence[Opcodes], seeds: Sequence[int]) -> Scored:
+class Batch(NamedTuple):
+    """Programs to score together, as an `Evaluator` takes them."""
+
+    programs: Sequence[Opcodes]
+    seeds: Sequence[int]
+    to_beat_s: float = math.inf
+
+
+def score_batch(packed: Recipe, batch: Batch) -> Scored:
     """Score a batch; this is what executors run."""
     began = time.perf_counter()
-    scores = unpack(packed)(programs, seeds)
+    scores = unpack(packed)(*batch)
     return Scored(scores, time.perf_counter() - began)

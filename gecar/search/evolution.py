@@ -9,6 +9,7 @@ print(evolution.best.program, evolution.best.fitness_s)
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -164,7 +165,8 @@ class Evolution:
             if phenotype is not None and phenotype.digest not in self._cache:
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
-        return [Candidate(program, noise_seed(self.seed, program)) for program in programs.values()]
+        to_beat_s = math.inf if self._best is None else self._best.fitness_s
+        return [Candidate(p, noise_seed(self.seed, p), to_beat_s) for p in programs.values()]
 
     def tell(self, results: Any) -> Generation:
         """Take the scores of the programs asked for.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,11 @@ Bytes = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A program that wants a score, and the seed of the noise it is driven with."""
+    """A program that wants a score, the seed of the noise it is driven with, and the best fitness so far [s]."""
 
     program: Program
     seed: int
+    to_beat_s: float = math.inf
 
 
 @dataclass(frozen=True)
