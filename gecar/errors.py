@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class InputError(ValueError):
@@ -33,3 +37,41 @@ def expected(where: str | Path, found: object, wanted: str) -> InputError:
         ``where: found …, expected …``; raise it.
     """
     return InputError(f"{where}: found {found}, expected {wanted}")
+
+
+def first_fault(error: ValidationError, where: str | Path, fields: str, *, between: str = ", ") -> InputError:
+    """Make the error for the first fault pydantic found in a table.
+
+    Parameters
+    ----------
+    error
+        What it raised.
+    where
+        File, or table, the fields stand in.
+    fields
+        Which ones there are, for a field that is none of them.
+    between
+        What stands between `where` and the field's name.
+    """
+    fault = error.errors(include_url=False)[0]
+    field = _field_name(fault["loc"])
+    place = f"{where}{between}{field}" if field else where
+    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if message.startswith("found "):
+        return InputError(f"{place}: {message}")
+    if fault["type"] == "missing":
+        return expected(place, "nothing", "a value")
+    if fault["type"] == "extra_forbidden":
+        return expected(place, "an unknown field", fields)
+    return expected(place, _short(fault["input"]), message)
+
+
+def _field_name(parts: tuple[int | str, ...]) -> str:
+    """Return ``obstacles[0].mass_kg`` for ("obstacles", 0, "mass_kg")."""
+    shown = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
+    return "".join(shown).removeprefix(".")
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -275,7 +275,7 @@ def test_a_full_disk_ends_in_one_line_and_the_run_goes_on_later(
             "--resume: found search.mutation_rate = 0.07, expected 0.05 as in ",
         ),
         ({"course": "nowhere"}, "--resume: found course = 'nowhere', expected 'paper' as in "),
-        ({"search": {"populatoin": 9}}, "options, search.populatoin: found an unknown setting"),
+        ({"search": {"populatoin": 9}}, "options, search.populatoin: found an unknown field"),
     ],
 )
 def test_options_that_would_change_the_result_are_refused_on_resume(

@@ -31,7 +31,7 @@ def test_robot_file_is_read_back_equal(tmp_path):
         ("mass = 0.75", "", "body.mass: found nothing"),
         ("mass = 0.75", "mass = 0.75\nmas = 1", "body.mas: found an unknown field"),
         ("com_ahead = -0.0322", "com_ahead = -0.2", "between the axle and the caster"),
-        ('mode = "duty"', 'mode = "torque"', "drive.mode: found torque"),
+        ('mode = "duty"', 'mode = "torque"', "drive.mode: found 'torque', expected 'duty' or 'speed'"),
         ("[body]", "[body", "not TOML"),
     ],
 )

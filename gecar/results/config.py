@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from gecar.errors import InputError, expected
+from gecar.errors import expected, first_fault
 from gecar.files import is_file, read_toml
 from gecar.language.mapping import MappingOptions
 from gecar.search.executors import MAX_WORKERS, usable_cores
@@ -105,7 +105,7 @@ def configure(table: Mapping[str, Any], where: str | Path = "configuration") -> 
     try:
         return Config.model_validate(given)
     except ValidationError as error:
-        raise _first_fault(error, where) from None
+        raise first_fault(error, where, f"one of {', '.join(Config.model_fields)}") from None
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -169,11 +169,3 @@ def _toml(value: Any) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)
-
-
-def _first_fault(error: ValidationError, where: str | Path) -> InputError:
-    fault = error.errors(include_url=False)[0]
-    place = f"{where}, {'.'.join(map(str, fault['loc']))}"
-    if fault["type"] == "extra_forbidden":
-        return expected(place, "an unknown field", f"one of {', '.join(Config.model_fields)}")
-    return expected(place, repr(fault["input"])[:40], fault["msg"].removeprefix("Input should be "))

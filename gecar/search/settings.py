@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from gecar.errors import InputError, expected
+from gecar.errors import expected, first_fault
 
 TABLE_4_CROSSOVER_RATES = (0.4, 0.5, 0.7)
 TABLE_4_MUTATION_RATES = (0.03, 0.05, 0.07)
@@ -150,15 +150,5 @@ def preset(name: str, changes: Mapping[str, Any] | None = None, where: str = "se
     try:
         return Settings.model_validate({**PRESETS[name].model_dump(), **(changes or {})})
     except ValidationError as error:
-        raise _first_fault(error, where) from None
-
-
-def _first_fault(error: ValidationError, where: str) -> InputError:
-    fault = error.errors(include_url=False)[0]
-    place = ".".join([where, *map(str, fault["loc"])])
-    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if message.startswith("found "):
-        return InputError(f"{place}: {message}")
-    if fault["type"] == "extra_forbidden":
-        return expected(place, "an unknown setting", f"one of {', '.join(Settings.model_fields)}")
-    return expected(place, repr(fault["input"])[:40], message)
+        fields = f"one of {', '.join(Settings.model_fields)}"
+        raise first_fault(error, where, fields, between=".") from None

@@ -46,7 +46,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError, model_validator
 
-from gecar.errors import InputError, expected
+from gecar.errors import expected, first_fault
 
 _Number = Annotated[float, Strict(), Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 _Positive = Annotated[float, Strict(), Field(gt=0, le=1e6, allow_inf_nan=False)]
@@ -190,28 +190,4 @@ def validate(table: Mapping[str, Any], where: str) -> CourseTable:
     try:
         return CourseTable.model_validate(table)
     except ValidationError as error:
-        raise _first_fault(error, where) from None
-
-
-def _first_fault(error: ValidationError, where: str) -> InputError:
-    fault = error.errors(include_url=False)[0]
-    place = f"{where}, {_field_name(fault['loc'])}" if fault["loc"] else where
-    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if message.startswith("found "):
-        return InputError(f"{place}: {message}")
-    if fault["type"] == "missing":
-        return expected(place, "nothing", "this field")
-    if fault["type"] == "extra_forbidden":
-        return expected(place, "an unknown field", "a field of course files (docs/courses.md)")
-    return expected(place, _short(fault["input"]), message)
-
-
-def _field_name(parts: tuple[int | str, ...]) -> str:
-    """Return ``obstacles[0].mass_kg`` for ("obstacles", 0, "mass_kg")."""
-    shown = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
-    return "".join(shown).removeprefix(".")
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+        raise first_fault(error, where, "a field of course files (docs/courses.md)") from None

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from gecar.errors import InputError, expected
+from gecar.errors import InputError, expected, first_fault
 from gecar.files import is_file, read_toml, write_whole
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS, Parameter
 
@@ -70,7 +70,7 @@ class Drive(_Section):
     """How commands become voltage: the cap on duty, and open loop ("duty") or regulated ("speed")."""
 
     duty_cap: Annotated[float, Field(gt=0, le=1)] = 1.0
-    mode: Annotated[str, Field(pattern="^(duty|speed)$")] = "duty"
+    mode: Literal["duty", "speed"] = "duty"
 
 
 class Tyre(_Section):
@@ -196,21 +196,7 @@ def robot_from(table: Mapping[str, Any], where: str | Path) -> Robot:
     try:
         return Robot.model_validate(table)
     except ValidationError as error:
-        raise _first_fault(error, where) from None
-
-
-def _first_fault(error: ValidationError, where: str | Path) -> InputError:
-    fault = error.errors()[0]
-    place = ".".join(str(part) for part in fault["loc"])
-    if fault["type"] == "missing":
-        return expected(f"{where}, {place}", "nothing", "a value")
-    if fault["type"] == "extra_forbidden":
-        return expected(f"{where}, {place}", "an unknown field", "one of the fields of a robot file")
-    message = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if message.startswith("found "):
-        return InputError(f"{where}: {message}")
-    found = fault["input"] if not isinstance(fault["input"], dict) else "other values"
-    return expected(f"{where}, {place}" if place else where, found, message)
+        raise first_fault(error, where, "one of the fields of a robot file") from None
 
 
 def read_robot(path: Path) -> Robot:
