@@ -12,15 +12,16 @@ from rich.progress import Progress
 
 from gecar.results.cells import Cell, cells_of
 from gecar.results.config import configure
-from gecar.results.performing import Workplace, perform_all
+from gecar.results.performing import perform_all
 from gecar.results.study import Planned, StudyFolder
 from gecar.search.executors import usable_cores
+from gecar.search.workplace import Workplace
 
 
-def add_seeds(parser: ArgumentParser, seeds: int) -> None:
+def add_seeds(parser: ArgumentParser, seeds: int, first: int = 1) -> None:
     """Let a study be asked for its seeds, e.g. for fresh ones."""
     parser.add_argument("--seeds", type=int, default=seeds, help="runs of each kind (%(default)s)")
-    parser.add_argument("--first-seed", type=int, default=1, help="(%(default)s)")
+    parser.add_argument("--first-seed", type=int, default=first, help="(%(default)s)")
 
 
 def seeds_of(asked: Namespace) -> range:

@@ -1,5 +1,7 @@
 """Ask and tell: the paper's settings, elitism, the cache, resuming, and what is refused."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from searching import MAPPER, N_ARRIVALS, SMALL, Toy, fingerprint, generations
@@ -8,7 +10,7 @@ from gecar.errors import InputError
 from gecar.search import cache
 from gecar.search.evolution import Evolution, run
 from gecar.search.fitness import UNSOLVED, invalid_scores, merit
-from gecar.search.history import pace
+from gecar.search.history import Patience, pace
 from gecar.search.settings import (
     PRESETS,
     TABLE_4_CROSSOVER_RATES,
@@ -24,6 +26,7 @@ VARIANTS = {
     "subtree, creep": {"crossover": "subtree", "mutation": "used_codon", "creep_rate": 0.2},
     "PonyGE2's": {"crossover": "variable_one_point", "mutation": "one_used_codon", "tournament": 2},
     "new programs": {"duplicates": "run", "mutation": "used_codon", "checkpoint_credit": True},
+    "begins anew": {"restart_after": 1, "mutation_rate": 0.0},
     "lexicase, ptc2": {"selection": "lexicase", "initialisation": "ptc2", "duplicates": "generation"},
 }
 
@@ -55,7 +58,7 @@ def test_the_paper_preset_is_table_4() -> None:
         ({"mutation_rate": 1.5}, "search.mutation_rate: found 1.5, expected less than or equal to 1"),
         ({"crossover_rate": float("nan")}, "search.crossover_rate: found nan"),
         ({"elites": 200}, "search: found elites = 200, expected fewer than population = 200"),
-        ({"popluation": 7}, "search.popluation: found an unknown setting, expected one of population, "),
+        ({"popluation": 7}, "search.popluation: found an unknown field, expected one of population, "),
         (
             {"mutation": "none"},
             "search.mutation: found 'none', expected 'codon', 'used_codon', 'one_used_codon' or 'renew'",
@@ -100,6 +103,30 @@ def test_an_elite_keeps_the_best_and_without_one_it_may_be_lost() -> None:
     assert best == sorted(best, reverse=True)
     histories = [generations(evolution("no elite, odd", seed), 7).history for seed in range(5)]
     assert any(h[k + 1].best > h[k].best for h in histories for k in range(6))
+
+
+def test_a_population_that_finds_nothing_faster_begins_anew_and_the_best_stays() -> None:
+    evolving = evolution("begins anew")
+    begun, bests = [], []
+    for generation in range(7):
+        generations(evolving, 1)
+        begun += [generation] * bool((evolving.parents < 0).all())
+        bests.append(evolving.best.fitness_s)
+    assert len(begun) > 1
+    assert bests == sorted(bests, reverse=True)
+    assert bests[-1] == min(record.best for record in evolving.history)
+    for first, second in pairwise(begun):
+        assert evolving.history[second - 1].best == evolving.history[second - 2].best
+        assert second - first > 1
+
+
+def test_patience_waits_while_nobody_is_at_goal() -> None:
+    patience = Patience(2)
+    ends = []
+    for best_s in (UNSOLVED, UNSOLVED, UNSOLVED, 20.0, 19.0, 19.0, 19.0, 30.0, 30.0):
+        patience.see(best_s)
+        ends.append(patience.at_its_end)
+    assert ends == [False] * 6 + [True] + [False] * 2
 
 
 def test_a_program_is_asked_for_once_in_a_run() -> None:

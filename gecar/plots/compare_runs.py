@@ -69,7 +69,7 @@ def _draw_group(
 def _best_at(history: History, evaluations: Series) -> Series:
     """Return a run's best at each count of evaluations; inf before GOAL, and its last best after its end."""
     index = np.searchsorted(history["evaluations"], evaluations, side="right") - 1
-    best = np.where(history["best"] < UNSOLVED, history["best"], np.inf)
+    best = np.minimum.accumulate(np.where(history["best"] < UNSOLVED, history["best"], np.inf))
     return np.where(index >= 0, best[np.maximum(index, 0)], np.inf)
 
 

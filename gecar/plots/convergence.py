@@ -59,12 +59,13 @@ def convergence(
     title, detail
         What to write above it.
     """
-    generation, best = history["generation"], history["best"]
+    generation, best = history["generation"], np.minimum.accumulate(history["best"])
     with look():
         figure = new_figure(8.0, 6.6)
         headline(figure, title, detail)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
         draw_best(top, generation, best, references)
+        _draw_begun_anew(top, history, best)
         if "mean_solved" in history:
             top.plot(
                 generation, history["mean_solved"], color=ORANGE, linewidth=1.2, label="mean of those at GOAL"
@@ -96,6 +97,24 @@ def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence
             f"{best[-1]:.2f} s", (1.0, best[-1]), (5, 0), xycoords=("axes fraction", "data"),
             textcoords="offset points", va="center", weight="bold", color=BLUE,
         )  # fmt: skip
+
+
+def _draw_begun_anew(axes: Axes, history: Mapping[str, Series], best: Series) -> None:
+    """Draw the generations' own bests where they fall behind the run's: a new population began."""
+    behind = np.flatnonzero(history["best"] > best)
+    if behind.size:
+        drawn = history["best"] < UNSOLVED
+        drawn[: behind[0]] = False
+        times = np.where(drawn, history["best"], np.nan)
+        axes.step(
+            history["generation"],
+            times,
+            where="post",
+            color=BLUE,
+            linewidth=1.0,
+            linestyle=":",
+            label="best of a new population",
+        )
 
 
 def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:

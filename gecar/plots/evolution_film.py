@@ -76,7 +76,7 @@ class EvolutionScene(Scene):
         super().__init__(world, champion.program, champion.drive, champion.title)
 
     def _draw_below(self) -> None:
-        generation, best = self.history["generation"], self.history["best"]
+        generation, best = self.history["generation"], np.minimum.accumulate(self.history["best"])
         times = np.where(best < UNSOLVED, best, np.nan)
         now = self.champion.generation
         self.below.step(generation, times, where="post", color=FAINT)

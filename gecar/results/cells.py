@@ -50,8 +50,9 @@ class Cell:
 
     @property
     def bests_s(self) -> Floats:
-        """Best fitness of each run by generation [s], shape (runs, generations + 1)."""
-        return np.array([record["history"]["best"] for record in self.records], float)
+        """Best fitness of each run so far by generation [s], shape (runs, generations + 1)."""
+        bests = np.array([record["history"]["best"] for record in self.records], float)
+        return np.minimum.accumulate(bests, axis=1)
 
     @property
     def generation(self) -> Floats:

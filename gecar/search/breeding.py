@@ -70,13 +70,13 @@ class Breeder:
         self._phenotypes = Phenotypes(mapper)
         self._operators = _operators(settings)
 
-    def first(self, known: Callable[[bytes], bool]) -> Bred:
-        """Return the first population."""
+    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred:
+        """Return a first population: that of generation 0, or of a later one that begins anew."""
         settings = self.settings
 
         def draw(attempt: int) -> Drawn:
             n = settings.population
-            genomes = initialise(settings, self.mapper, spawn(self.seed, 0, attempt, n))
+            genomes = initialise(settings, self.mapper, spawn(self.seed, generation, attempt, n))
             return genomes, np.full((n, 2), -1, np.int32), np.zeros(n, np.uint8)
 
         return self._without_duplicates(draw, 0, known)

@@ -23,7 +23,7 @@ from gecar.language.program import Program
 from gecar.search.breeding import Bred, Breeder
 from gecar.search.cache import ScoreCache
 from gecar.search.fitness import Scores, as_scores, invalid_scores, merit
-from gecar.search.history import HISTORY, Generation, Totals, summary
+from gecar.search.history import HISTORY, Generation, Patience, Totals, summary
 from gecar.search.lineage import Ledger
 from gecar.search.settings import Settings
 from gecar.search.state import Best, Candidate, State
@@ -66,6 +66,7 @@ class Evolution:
         self._bred: Bred | None = None
         self._parents = np.zeros((0, 2), np.int32)
         self._ledger = Ledger()
+        self._patience = Patience(settings.restart_after)
         self._asked: dict[bytes, list[int]] = {}
         self._began: float | None = None
         self._earlier_s = 0.0
@@ -75,6 +76,8 @@ class Evolution:
         """Go on from a state, to the same end as if there had been no break."""
         evolution = cls(settings, mapper, state.seed, n_arrivals)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
+        for generation in evolution.history:
+            evolution._patience.see(generation.best)
         evolution.genomes, evolution.scores = state.genomes, state.scores
         evolution._ledger = Ledger(state.lineage, going_on=True)
         evolution._earlier_s = evolution.history[-1].wall_s
@@ -199,9 +202,10 @@ class Evolution:
         return self.history[-1]
 
     def _breed(self) -> Bred:
-        if not self.history:
-            return self._breeder.first(self._cache.__contains__)
-        return self._breeder.next(self.genomes, self.scores, len(self.history), self._cache.__contains__)
+        generation, known = len(self.history), self._cache.__contains__
+        if not self.history or self._patience.at_its_end:
+            return self._breeder.begin(generation, known)
+        return self._breeder.next(self.genomes, self.scores, generation, known)
 
     def _score(self, bred: Bred, told: Scores) -> Scores:
         """Put together the population's scores: invalid, known before, or told now."""
@@ -221,6 +225,7 @@ class Evolution:
         )
         programs = len({phenotype.digest for phenotype in bred.phenotypes if phenotype is not None})
         self.history.append(summary(len(self.history), self.scores, programs, totals, self._wall_s()))
+        self._patience.see(self.history[-1].best)
         fittest = int(np.lexsort((-self.scores["share"], self.scores["fitness_s"]))[0])
         if self._best is None or _rank(self.scores[fittest]) < _rank(self._best.score[0]):
             phenotype = bred.phenotypes[fittest]

@@ -97,6 +97,34 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
     )
 
 
+class Patience:
+    """Says when a population has come to its end: at GOAL, and for so many generations no faster.
+
+    Parameters
+    ----------
+    generations
+        How many; 0 is without end.
+    """
+
+    def __init__(self, generations: int) -> None:
+        self._limit = generations
+        self._best_s, self._idle = UNSOLVED, 0
+
+    @property
+    def at_its_end(self) -> bool:
+        """Whether the next generation is to be a new population."""
+        return 0 < self._limit <= self._idle
+
+    def see(self, best_s: float) -> None:
+        """Take the best fitness of a generation [s]; after an end it is that of a new population."""
+        if self.at_its_end:
+            self._best_s, self._idle = UNSOLVED, 0
+        if best_s < self._best_s:
+            self._best_s, self._idle = best_s, 0
+        elif self._best_s < UNSOLVED:
+            self._idle += 1
+
+
 @dataclass(frozen=True)
 class Pace:
     """How fast a run goes.

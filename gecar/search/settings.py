@@ -63,6 +63,9 @@ class Settings(BaseModel):
         ``generation``, or was simulated before in the ``run``.
     attempts
         How often a duplicate is bred again.
+    restart_after
+        Generations at GOAL without a faster program, after which a new population begins; the best so far stays
+        the run's result. 0: never.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -84,6 +87,7 @@ class Settings(BaseModel):
     creep_rate: Rate = 0.0
     duplicates: Literal["kept", "generation", "run"] = "kept"
     attempts: int = Field(10, ge=1, le=1_000)
+    restart_after: int = Field(0, ge=0, le=1_000_000)
 
     @model_validator(mode="after")
     def _fits(self) -> Settings:
@@ -119,7 +123,7 @@ PRESETS = {
         mutation="used_codon",
         mutation_rate=0.05,
         creep_rate=0.3,
-        duplicates="run",
+        restart_after=25,
     ),
 }
 """Settings by name: the paper's; random search; and what finds faster programs (`benchmarks/better_search.py`).
