@@ -6,9 +6,10 @@ import pytest
 from gecar.errors import InputError
 from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
 from gecar.results.cells import cells_of, difference_p
-from gecar.results.performing import Workplace, perform, perform_all
+from gecar.results.performing import perform, perform_all
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.results.study import Axis, Study, StudyFolder, read_study
+from gecar.search.workplace import Workplace
 
 SMALL = {"workers": 1, "search": {"population": 10, "generations": 1, "codons": 50}}
 

@@ -31,10 +31,11 @@ from gecar.report.table import (
 )
 from gecar.results.cells import Cell, cells_of, difference_p
 from gecar.results.config import read_config
-from gecar.results.performing import Workplace, perform_all
+from gecar.results.performing import perform_all
 from gecar.results.running import load_task
 from gecar.results.study import Axis, Planned, Study, StudyFolder, other_versions, read_study
 from gecar.search.executors import check_workers, usable_cores
+from gecar.search.workplace import Workplace
 
 
 @dataclass(frozen=True)

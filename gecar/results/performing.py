@@ -5,23 +5,18 @@ A run gives what ``gecar evolve`` gives with the same settings and seed, whichev
 
 from __future__ import annotations
 
-import multiprocessing
-import sys
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass
-from functools import partial
+from concurrent.futures import Future
 from typing import Any
 
-from gecar.errors import InputError
 from gecar.results.config import Config
 from gecar.results.provenance import versions
 from gecar.results.running import load_task, verified_on_pymunk
 from gecar.results.study import Planned, StudyFolder
-from gecar.search.batches import MAX_DEATHS, Batches
+from gecar.search.batches import Batches
 from gecar.search.evolution import Evolution, run
-from gecar.search.executors import open_executor, side_by_side
 from gecar.search.history import Generation
+from gecar.search.workplace import Workplace, perform_each
 
 
 def perform(config: Config) -> dict[str, Any]:
@@ -66,33 +61,6 @@ def outcome_of(evolution: Evolution) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class Workplace:
-    """Where whole runs are performed.
-
-    Attributes
-    ----------
-    open
-        Makes the executor, and makes it again after a worker died.
-    workers
-        How many runs go side by side.
-    """
-
-    open: Callable[[], Executor]
-    workers: int
-
-    @classmethod
-    def of(cls, kind: str, workers: int, scheduler: str = "") -> Workplace:
-        """Return an executor by kind; see `gecar.search.executors.open_executor`.
-
-        Raises
-        ------
-        InputError
-            If there is no such kind, no worker, or Dask does not answer.
-        """
-        return cls(partial(open_executor, kind, workers, scheduler), side_by_side(kind, workers, scheduler))
-
-
 def perform_all(
     runs: Sequence[Planned], folder: StudyFolder, place: Workplace, after: Callable[[Planned], None]
 ) -> None:
@@ -116,52 +84,9 @@ def perform_all(
     KeyboardInterrupt
         On Ctrl-C, when the workers are gone; what was finished is kept.
     """
-    left, deaths = list(runs), 0
-    while left:
-        before = len(left)
-        executor = place.open()
-        try:
-            _attempt(left, folder, executor, place.workers, after)
-        except BrokenExecutor:
-            deaths = 1 if len(left) < before else deaths + 1
-            _say_death(deaths)
-        except BaseException:
-            _stop_workers()
-            raise
-        finally:
-            executor.shutdown(wait=False, cancel_futures=True)
 
+    def keep(planned: Planned, future: Future[dict[str, Any]]) -> None:
+        folder.keep(planned, future.result())
+        after(planned)
 
-def _attempt(
-    left: list[Planned],
-    folder: StudyFolder,
-    executor: Executor,
-    side_by_side: int,
-    after: Callable[[Planned], None],
-) -> None:
-    """Perform runs until none is left or a worker dies; those kept are taken off ``left``."""
-    waiting = iter(list(left))
-    going: dict[Future[dict[str, Any]], Planned] = {}
-    while left:
-        while len(going) < side_by_side and (planned := next(waiting, None)) is not None:
-            going[executor.submit(perform, planned.config)] = planned
-        for future in wait(going, return_when=FIRST_COMPLETED).done:
-            planned = going.pop(future)
-            folder.keep(planned, future.result())
-            left.remove(planned)
-            after(planned)
-
-
-def _say_death(deaths: int) -> None:
-    if deaths > MAX_DEATHS:
-        raise InputError(
-            f"workers: found that they died {deaths} times in a row (killed, or out of memory), "
-            "expected them to live; fewer workers need less memory"
-        )
-    print("a worker died; started new ones, and its run begins again", file=sys.stderr, flush=True)
-
-
-def _stop_workers() -> None:
-    """End this process's workers at once: nobody wants what they are in the middle of."""
-    for worker in multiprocessing.active_children():
-        worker.terminate()
+    perform_each(place, perform, [(planned, planned.config) for planned in runs], keep)

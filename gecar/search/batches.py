@@ -15,7 +15,7 @@ import numpy as np
 from gecar.errors import InputError
 from gecar.language.opcodes import N_COLUMNS
 from gecar.search.evaluation import Batch, Evaluator, Scored, recipe, score_batch
-from gecar.search.executors import SerialExecutor
+from gecar.search.executors import MAX_DEATHS, QUIET_S, SerialExecutor
 from gecar.search.fitness import Scores
 from gecar.search.state import Candidate
 
@@ -23,11 +23,6 @@ LONGEST_S = 0.1
 """Longest batch aimed at: long enough that sending it costs nothing, short enough to share work evenly."""
 SHORTEST_S = 0.002
 """Shortest batch aimed at: sending one through a process pool costs about 0.2 ms."""
-MAX_DEATHS = 3
-"""How often in a row workers may die without finishing anything."""
-
-QUIET_S = 30.0
-"""How long a batch may be away before the executor is asked whether anybody is there to run it [s]."""
 
 _EMPTY = np.zeros((0, N_COLUMNS), np.int32)
 

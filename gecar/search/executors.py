@@ -19,6 +19,10 @@ from typing import Any
 from gecar.errors import expected
 
 MAX_WORKERS = 1_024
+MAX_DEATHS = 3
+"""How often in a row workers may die without finishing anything."""
+QUIET_S = 30.0
+"""How long nothing may come back before an executor is asked whether anybody is there to work [s]."""
 _PRELOADED = "gecar.search.preloaded"
 
 
