@@ -24,8 +24,9 @@ class Judged:
 
     ``truth``: effects' identifiers, or the kind outside the catalogue, or nothing. ``named``: the sets of names
     given. ``d_prime``: per concealed thing. ``hits``: concealed effects named, each by a set of its own. ``covered``:
-    for every parameter that could be compared, whether the interval holds the truth. Entries are nan, or empty,
-    where a verdict does not say.
+    for every parameter that could be compared, whether the interval holds the truth. ``gap_closed``: as the verdict
+    has it, over the channels with a gap; ``gap_closed_over_all``: over all channels, those of noise alone as well.
+    Entries are nan, or empty, where a verdict does not say.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Judged:
     hits: tuple[str, ...]
     covered: Mapping[str, bool] = field(default_factory=dict)
     gap_closed: float = math.nan
+    gap_closed_over_all: float = math.nan
     channel_right: bool | None = None
     regime_overlap: float = math.nan
 
@@ -77,6 +79,7 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
     truth = tuple(effect["id"] for effect in label["effects"])
     matched = _matched(truth, named)
     outside = label.get("outside")
+    holdout = verdict.get("holdout") or {}
     channel, overlap = _located(verdict.get("located") or [], seen, label["runs"])
     return Judged(
         name=label["case"],
@@ -87,10 +90,17 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
         d_prime=seen["d_prime"],
         hits=tuple(matched),
         covered=_covered(label["effects"], {key: effects[place] for key, place in matched.items()}),
-        gap_closed=_number((verdict.get("holdout") or {}).get("gap_closed")),
+        gap_closed=_number(holdout.get("gap_closed")),
+        gap_closed_over_all=_closed_over_all(holdout),
         channel_right=channel,
         regime_overlap=overlap,
     )
+
+
+def _closed_over_all(holdout: Mapping[str, Any]) -> float:
+    """Return the share of the gap closed over the channels' means; nan where there is none."""
+    before, after, floor = (_number(holdout.get(key)) for key in ("before", "after", "floor"))
+    return (before - after) / (before - floor) if before > floor else math.nan
 
 
 def _matched(truth: Sequence[str], named: Sequence[frozenset[str]]) -> dict[str, int]:

@@ -114,6 +114,11 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
             "95 % intervals cover", [held for one in judged for held in one.covered.values()], "0.92-0.98"
         ),
         _middle("held-out gap closed, named right (median)", [one.gap_closed for one in found], ">= 0.90"),
+        _middle(
+            "the same over all channels, those of noise alone too (median)",
+            [one.gap_closed_over_all for one in found],
+            ">= 0.90",
+        ),
         _share("located: channel right", [one.channel_right for one in strong + of["outside"]], ">= 0.95"),
         _middle(
             "located: regime overlap (median)",
