@@ -71,9 +71,7 @@ def test_a_second_start_is_refused():
 
 
 def test_missing_goal_and_start_are_named():
-    assert (
-        refusal(course_text().replace("goal", "# goal")) == "c.toml, goal: found nothing, expected a value"
-    )
+    assert refusal(course_text().replace("goal", "# goal")) == "c.toml, goal: found nothing, expected a value"
     assert refusal("map = '--'\ngoal = [0, 0]").startswith("c.toml, start: found nothing")
 
 

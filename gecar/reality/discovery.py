@@ -141,28 +141,14 @@ def discover(
         more, others = _found(shop, sight, seen, found_robot)
         found, rivals = found + more, rivals + others
     where = _map(shop, motion, sight)
-    located = where.places(np.random.default_rng(seed))
     unexplained = moved.unexplained or bool(seen and seen.unexplained)
-    verdict = (
-        ("missing_and_unexplained" if found else "unexplained")
-        if unexplained
-        else ("missing" if found else "nothing")
-    )
-    white, p = whiteness(motion, moved.taken)
-    physics = moved.taken.freedom.physics(moved.taken.fit.z)
-    formulas = describe(shop.strips, physics) if moved.unexplained else ()
     return Verdict(
         case=case.name,
-        verdict=verdict,
+        verdict=_word(bool(found), unexplained),
         effects=found,
-        located=located,
+        located=where.places(np.random.default_rng(seed)),
         judgement=judgement,
-        residual=Residual(
-            white and not unexplained,
-            p,
-            "; ".join(map(str, formulas)) or None,
-            _described(shop, found_robot, formulas) if with_formula and formulas else None,
-        ),
+        residual=_left(shop, motion, moved, found_robot, unexplained, with_formula),
         next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
@@ -171,6 +157,12 @@ def discover(
             motion, moved, sight, seen, where, tuple(shop.strips), tuple(shop.held), shop.robot
         ),
     )
+
+
+def _word(named: bool, unexplained: bool) -> str:
+    if named:
+        return "missing_and_unexplained" if unexplained else "missing"
+    return "unexplained" if unexplained else "nothing"
 
 
 def _open(
@@ -224,6 +216,22 @@ def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
     sight.set_path(found.physics, colour)
     channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
     return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
+
+
+def _left(
+    shop: _Workshop,
+    motion: Selection,
+    moved: Explanation,
+    found: Robot,
+    unexplained: bool,
+    with_formula: bool,
+) -> Residual:
+    """Return what is left: whether it is white, and formulas for what nothing explains."""
+    white, p = whiteness(motion, moved.taken)
+    physics = moved.taken.freedom.physics(moved.taken.fit.z)
+    formulas = describe(shop.strips, physics) if moved.unexplained else ()
+    gained = _described(shop, found, formulas) if with_formula and formulas else None
+    return Residual(white and not unexplained, p, "; ".join(map(str, formulas)) or None, gained)
 
 
 def _described(shop: _Workshop, found: Robot, formulas: Sequence[Formula]) -> dict[str, Misfit]:
