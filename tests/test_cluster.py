@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -17,6 +20,7 @@ import numpy as np
 import pytest
 from searching import MAPPER, SMALL, Toy, fingerprint, toy_scores
 
+from benchmarks.concealed.runner import run_all
 from gecar.errors import InputError
 from gecar.results.folder import read_history, read_result
 from gecar.search import cluster as cluster_module
@@ -32,6 +36,8 @@ from gecar.world.rollout import World
 
 distributed = pytest.importorskip("distributed", reason="pip install 'gecar[cluster]'")
 WORLD = World(load_robot("ev3"), load_course("paper"), time_limit_s=4.0)
+SILENT_TOOL = Path(__file__).parent / "silent_tool.py"
+TOOL = f"{{python}} {shlex.quote(str(SILENT_TOOL))} {{case}} {{out}}"
 TINY = ("--population", 20, "--generations", 2, "--time-limit", 4, "--no-pictures")
 
 
@@ -87,6 +93,43 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(address: str, tmp_path: Path
     assert (tmp_path / "mark").exists()
 
 
+def open_cases(folder: Path) -> Path:
+    for name in "ab":
+        (folder / "cases" / name).mkdir(parents=True)
+        (folder / "cases" / name / "run_1.csv").write_text("t_s\n")
+    return folder / "cases"
+
+
+def test_an_examination_leaves_on_a_cluster_what_it_leaves_here(address: str, tmp_path: Path) -> None:
+    cases, left = open_cases(tmp_path), {}
+    for place in (("thread", ""), ("dask", address)):
+        out = tmp_path / place[0]
+        assert run_all(cases, out, TOOL, 2, 60.0, None, out / "journal", math.inf, *place) == []
+        notes = [json.loads(line) for line in (out / "journal").read_text().splitlines()]
+        told = sorted((note["case"], note["verdict"], note["verdict_sha256"]) for note in notes)
+        left[place[0]] = told, [path.read_bytes() for path in sorted(out.glob("*/*"))]
+    assert left["dask"] == left["thread"]
+    assert left["dask"][1][0] == b"a\n"  # its log: beside the case lies nothing
+
+
+def test_a_killed_worker_loses_no_case_of_an_examination(address: str, tmp_path: Path) -> None:
+    mark, tool = tmp_path / "mark", tmp_path / "tool.py"
+    tool.write_text(
+        "import os, pathlib, runpy, shutil, sys\n"
+        f"mark = pathlib.Path({str(mark)!r})\n"
+        "if not mark.exists():\n"
+        "    mark.touch()\n"
+        "    shutil.rmtree(pathlib.Path(sys.argv[1]).parents[1])\n"  # the worker no longer can
+        f"    os.kill(os.getppid(), {int(signal.SIGKILL)})\n"
+        "    sys.exit()\n"
+        f"runpy.run_path({str(SILENT_TOOL)!r}, run_name='__main__')\n"
+    )
+    words = f"{{python}} {shlex.quote(str(tool))} {{case}} {{out}}"
+    cases, out = open_cases(tmp_path), tmp_path / "out"
+    assert run_all(cases, out, words, 2, 60.0, executor="dask", scheduler=address) == []
+    assert mark.exists()
+
+
 def test_without_an_address_a_cluster_starts_here_and_ends(tmp_path: Path) -> None:
     executor = open_executor("dask", 1)
     process = executor.submit(os.getpid).result()
@@ -132,8 +175,6 @@ def test_a_scheduler_without_workers_or_that_goes_away_is_one_line(tmp_path: Pat
         while not place.exists():
             assert scheduler.poll() is None
             time.sleep(0.05)
-        import json
-
         address = json.loads(place.read_text())["address"]
         with pytest.raises(InputError, match=r"which has no worker, expected at least one; start them with"):
             open_executor("dask", 1, address)

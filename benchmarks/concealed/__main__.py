@@ -16,6 +16,8 @@ from benchmarks.concealed.runner import DISCOVER, run_all
 if TYPE_CHECKING:
     from benchmarks.concealed.plan import Counts
 
+STOPPED = "stopped; the same command goes on from here"
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Parse the command line and run one command.
@@ -36,6 +38,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print(f"\n{STOPPED}", file=sys.stderr)
+        return 130
     return code
 
 
@@ -69,7 +74,9 @@ def _parser() -> argparse.ArgumentParser:
 
     run = commands.add_parser("run", help="run a tool on every open case; resumes")
     run.add_argument("--verdicts", type=Path, required=True)
-    run.add_argument("--tool", default=DISCOVER, help="command with {case}, {out} and, if wanted, {holdout}")
+    run.add_argument(
+        "--tool", default=DISCOVER, help="command with {case}, {out} and, if wanted, {python}, {holdout}"
+    )
     run.add_argument("--timeout", type=float, default=900.0, help="seconds a case may take")
     run.set_defaults(command=_run)
 
@@ -78,6 +85,14 @@ def _parser() -> argparse.ArgumentParser:
     score.add_argument("--title", default="Concealed cases")
     score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
     score.set_defaults(command=_score)
+
+    for command in (exam, run):
+        command.add_argument(
+            "--executor",
+            choices=("thread", "dask"),
+            help="where tools run: on this machine (default), or a cluster",
+        )
+        command.add_argument("--scheduler", default="", metavar="ADDRESS", help="Dask's scheduler")
 
     for command in (draw, plan, exam, run, score):
         command.add_argument(
@@ -151,9 +166,18 @@ def _exam(chosen: argparse.Namespace) -> int:
     terms = agreed(chosen.out, chosen.seed, _counts(chosen, Counts()))
     stopped = 0
     try:
-        examine(chosen.out, terms, tools, chosen.compare, chosen.workers, chosen.timeout, chosen.minutes)
+        examine(
+            chosen.out,
+            terms,
+            tools,
+            chosen.compare,
+            chosen.workers,
+            chosen.timeout,
+            chosen.minutes,
+            *_place(chosen),
+        )
     except KeyboardInterrupt:
-        print("\nstopped; the same command goes on from here", file=sys.stderr)
+        print(f"\n{STOPPED}", file=sys.stderr)
         stopped = 130
     if not (chosen.out / "manifest.sha256").exists():
         return stopped
@@ -170,9 +194,18 @@ def _run(chosen: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return 2
-    failed = run_all(chosen.out / "cases", chosen.verdicts, chosen.tool, chosen.workers, chosen.timeout)
+    executor, scheduler = _place(chosen)
+    failed = run_all(
+        chosen.out / "cases", chosen.verdicts, chosen.tool, chosen.workers, chosen.timeout,
+        executor=executor, scheduler=scheduler,
+    )  # fmt: skip
     print("\n".join(failed))
     return 1 if failed else 0
+
+
+def _place(chosen: argparse.Namespace) -> tuple[str, str]:
+    """Return where tools run: an address alone asks for a cluster."""
+    return chosen.executor or ("dask" if chosen.scheduler else "thread"), chosen.scheduler
 
 
 def _score(chosen: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import shlex
 import sys
 import time
 from collections.abc import Sequence
@@ -17,8 +16,7 @@ from benchmarks.concealed.runner import DISCOVER, run_all
 GECAR = "gecar"
 COMPARATORS = ("bic", "everything", "sparse", "no_whitening", "no_null", "no_refit")
 _COMPARATOR = (
-    f"{shlex.quote(sys.executable)} -m benchmarks.concealed.comparators {{name}}"
-    " {{case}} --out {{out}} --holdout {{holdout}}"
+    "{{python}} -m benchmarks.concealed.comparators {name} {{case}} --out {{out}} --holdout {{holdout}}"
 )
 
 
@@ -81,6 +79,8 @@ def examine(
     workers: int,
     timeout_s: float,
     minutes: float,
+    executor: str = "thread",
+    scheduler: str = "",
 ) -> None:
     """Draw and seal what is not there yet, and run every tool on what it has not seen; resumes.
 
@@ -100,6 +100,8 @@ def examine(
         After which a case is given up [s].
     minutes
         After which no case is begun.
+    executor, scheduler
+        Where tools run, as `run_all`; cases are drawn here.
     """
     until = time.monotonic() + 60.0 * minutes
     cases = plan(terms.seed, terms.counts)
@@ -109,4 +111,15 @@ def examine(
         print(f"{tool}:", file=sys.stderr)
         seen = names if tool == GECAR else names[:compared]
         verdicts, journal = out / "verdicts" / tool, out / "outcomes" / f"{tool}.jsonl"
-        run_all(out / "cases", verdicts, command(tool), workers, timeout_s, seen, journal, until)
+        run_all(
+            out / "cases",
+            verdicts,
+            command(tool),
+            workers,
+            timeout_s,
+            seen,
+            journal,
+            until,
+            executor,
+            scheduler,
+        )

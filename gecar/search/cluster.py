@@ -71,6 +71,11 @@ class DaskExecutor(Executor):
                 if each is not None:
                     each.close(timeout=5)
 
+    def call_everywhere(self, fn: Callable[..., Any], *args: Any) -> None:
+        """Call a function in every worker at once, beside what it is doing; a worker that does not answer is let be."""
+        with suppress(Exception):
+            self._client.run(fn, *args, on_error="ignore")
+
     def why_waiting(self) -> str:
         """Return a sentence if no worker is left; Dask waits until one comes."""
         with suppress(OSError):  # a scheduler that goes away meanwhile is told of by the batches
@@ -113,7 +118,16 @@ class DaskExecutor(Executor):
         except self._dask.KilledWorker as error:
             answer.set_exception(BrokenExecutor(str(error)))
         except Exception as error:  # noqa: BLE001  it is raised again where the result is asked for
-            answer.set_exception(error)
+            answer.set_exception(self._unlike(error) or error)
+
+    def _unlike(self, error: Exception) -> InputError | None:
+        """Return an error in one line if the scheduler or a worker could not import what was sent."""
+        if not isinstance(error, ImportError) and "deserializ" not in str(error):
+            return None
+        found = f"{self._where}, where something sent could not be imported ({error})".partition("\n")[0]
+        return expected(
+            "--scheduler", found, "scheduler and workers with all that is installed here, or on PYTHONPATH"
+        )
 
     def _gone(self) -> InputError:
         return expected("--scheduler", f"{self._where} no longer answers", "a Dask scheduler that stays")
