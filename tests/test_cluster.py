@@ -87,6 +87,28 @@ def test_commands_end_the_same_on_a_cluster(gecar: Any, address: str) -> None:
     assert gecar("evolve", "--resume", "--out", "there", "--executor", "serial", "--no-pictures").code == 0
 
 
+def test_a_pool_and_a_cluster_evolve_the_same(address: str) -> None:
+    ends = []
+    for place in (("process", 2), ("dask", 2, address)):
+        with Batches(DriveEvaluator(WORLD), partial(open_executor, *place), 2) as batches:
+            ends.append(evolved(batches))
+    assert ends[0] == ends[1]
+
+
+def test_a_table_is_the_same_from_a_pool_and_from_a_cluster(gecar: Any, address: str) -> None:
+    grid = ("--rows", "elites=0,1", "--columns", "mutation_rate=0.1", "--seeds", 2)
+    tables = {}
+    for out, place in (("pool", ("--workers", 2)), ("dask", ("--executor", "dask", "--scheduler", address))):
+        assert gecar("table", *grid, *TINY, *place, "--out", out).code == 0
+        runs = [json.loads(path.read_text()) for path in sorted(Path(out, "runs").iterdir())]
+        for each in runs:
+            each["wall_s"] = each["history"]["wall_s"] = 0
+        rows = Path(out, "table.csv").read_text().splitlines()
+        tables[out] = [row.rpartition(",")[0] for row in rows], runs  # its last column is the time they took
+    assert len(tables["pool"][1]) == 4
+    assert tables["pool"] == tables["dask"]
+
+
 def test_a_killed_worker_of_a_cluster_loses_nothing(address: str, tmp_path: Path) -> None:
     with Batches(Mortal(tmp_path / "mark"), partial(open_executor, "dask", 2, address), 2) as batches:
         assert evolved(batches) == evolved(Toy())

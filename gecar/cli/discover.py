@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from gecar.cli.voice import JsonOption, Voice, plain
+from gecar.cli.voice import JsonOption, Voice
 from gecar.errors import expected
-
-if TYPE_CHECKING:
-    from gecar.reality.verdict import Verdict
 
 
 def discover(
-    case: Annotated[
-        Path, typer.Argument(metavar="CASE", show_default=False, help="A folder of recordings of one robot.")
+    cases: Annotated[
+        list[Path],
+        typer.Argument(metavar="CASE...", show_default=False, help="Folders, each of recordings of one robot."),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Where verdict and pictures go.")
+        Path,
+        typer.Option("--out", metavar="FOLDER",
+                     help="Where verdict and pictures go; of several cases, a folder in it for each."),
     ] = Path("verdict"),
     holdout: Annotated[
         str,
@@ -32,7 +33,19 @@ def discover(
                      show_default="what the recordings name"),
     ] = "",
     seed: Annotated[int, typer.Option("--seed", help="Of every draw of chance.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", help="Threads; 0: all cores.")] = 0,
+    workers: Annotated[
+        int, typer.Option("--workers", help="Threads, or with --executor processes; 0: all cores.")
+    ] = 0,
+    executor: Annotated[
+        str,
+        typer.Option("--executor", metavar="serial|process|dask", help="Where whole cases are looked at.",
+                     show_default="serial: in this process, one after the other"),
+    ] = "",
+    scheduler: Annotated[
+        str,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+                     show_default=False),
+    ] = "",
     with_formula: Annotated[
         bool,
         typer.Option("--with-formula", show_default=False,
@@ -47,48 +60,47 @@ def discover(
 
       gecar discover recordings/monday --out verdicts/monday
       gecar discover recordings/monday --holdout run_07,run_08 --json
+      gecar discover recordings/* --out verdicts --executor process
       gecar evolve --robot verdicts/monday/robot.toml
     """
-    import json
-
-    from gecar.files import write_whole
-    from gecar.reality.discovery import discover as discover_case
+    from gecar.cli.discovering import Task, conclude, conclude_all, say, teller
     from gecar.reality.recording import read_case
-    from gecar.report.verdict import sentences
-    from gecar.world.robot import load_robot, write_robot
+    from gecar.search.executors import usable_cores
+    from gecar.world.robot import load_robot
 
     if workers < 0:
         raise expected("--workers", workers, "a number of 0 or more")
-    voice = Voice(as_json)
-    verdict = discover_case(
-        read_case(case),
-        [name.strip() for name in holdout.split(",") if name.strip()],
-        load_robot(robot) if robot else None,
-        seed,
-        workers or None,
-        lambda line: voice.say(f"  {line}", style="dim"),
-        with_formula,
-    )
-    out.mkdir(parents=True, exist_ok=True)
-    write_whole(out / "verdict.json", json.dumps(plain(verdict.as_json()), indent=1, allow_nan=False) + "\n")
-    write_robot(verdict.robot, out / "robot.toml")
-    if pictures:
-        voice.say("  pictures", style="dim")
-        _draw(verdict, out)
-    for line in sentences(verdict):
-        voice.say(line)
-    voice.say(f"Written to {out}.")
-    voice.answer(verdict.as_json())
+    kind = executor or ("dask" if scheduler else "serial")
+    if kind not in ("serial", "process", "dask"):
+        raise expected("--executor", repr(kind), "serial, process or dask")
+    voice, names = Voice(as_json), [name.strip() for name in holdout.split(",") if name.strip()]
+    known, threads = load_robot(robot) if robot else None, (workers or None) if kind == "serial" else 1
+    tasks = {
+        folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures)
+        for folder, case in folders(out, cases).items()
+    }
+    if kind != "serial" or len(tasks) > 1:
+        conclude_all(voice, tasks, kind, workers or usable_cores(), scheduler)
+        return
+    told = conclude(tasks[out], out, teller(voice))
+    say(voice, told, out)
+    voice.answer(told.table)
 
 
-def _draw(verdict: Verdict, out: Path) -> None:
-    """Write the pictures, and report.html with the pictures inside."""
-    from gecar.files import write_whole
-    from gecar.plots.discovery import verdict_figures
-    from gecar.plots.style import save
-    from gecar.report.verdict_page import verdict_page
+def folders(out: Path, cases: Sequence[Path]) -> dict[Path, Path]:
+    """Return which folder each case goes to: a single one to the given folder itself.
 
-    paths = {name: save(figure, out / f"{name}.png") for name, figure in verdict_figures(verdict).items()}
-    write_whole(
-        out / "report.html", verdict_page(verdict, {name: path.read_bytes() for name, path in paths.items()})
-    )
+    Raises
+    ------
+    InputError
+        If two cases would go to the same.
+    """
+    if len(cases) == 1:
+        return {out: cases[0]}
+    found: dict[Path, Path] = {}
+    for case in cases:
+        folder = out / case.resolve().name
+        if folder in found:
+            raise expected("CASE", f"{found[folder]} and {case}", f"different names, for both go to {folder}")
+        found[folder] = case
+    return found

@@ -47,6 +47,14 @@ class Setup:
     noise: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     notes: str = ""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to another process, as a mapping proxy can not."""
+        return _arrived, ({**vars(self), "noise": dict(self.noise)},)
+
+
+def _arrived(fields: dict[str, Any]) -> Setup:
+    return Setup(**{**fields, "noise": MappingProxyType(fields["noise"])})
+
 
 def read_setup(path: Path, factors: Mapping[str, tuple[str, float]]) -> Setup:
     """Read the TOML beside a recording.
