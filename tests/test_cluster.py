@@ -183,6 +183,15 @@ def test_a_worker_with_another_gecar_is_refused() -> None:
         run_as_here("kernels-of-old", max, 3, 4)
 
 
+def test_workers_without_a_module_are_named(address: str) -> None:
+    with open_executor("dask", 1, address) as executor:
+        executor.must_have("json")
+        with pytest.raises(
+            InputError, match=r"whose worker tcp://\S+ has no nowhere.else, expected workers with"
+        ):
+            executor.must_have("nowhere.else")
+
+
 def _start(*words: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", *words]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

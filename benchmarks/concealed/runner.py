@@ -126,6 +126,8 @@ def run_all(
     pool, going = place.open(), dict[Future[Outcome], str]()
     began, failed = time.monotonic(), 0
     try:
+        if executor == "dask":
+            pool.must_have(__name__)
         for done, (name, future) in enumerate(as_they_end(pool, look, jobs, place.workers, going), start=1):
             failed += not _keep(cases / name, verdicts / name, journal, future)
             left = (time.monotonic() - began) / done * (len(waiting) - done) / 60.0

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import suppress
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from gecar.compiled import CACHE
@@ -76,6 +77,19 @@ class DaskExecutor(Executor):
         with suppress(Exception):
             self._client.run(fn, *args, on_error="ignore")
 
+    def must_have(self, module: str) -> None:
+        """Make sure that workers can import a module: sent a function of one that is not there, Dask waits for ever.
+
+        Raises
+        ------
+        InputError
+            If one of them can not.
+        """
+        lacking = [worker for worker, has in self._client.run(importable, module).items() if not has]
+        if lacking:
+            found = f"{self._where}, whose worker {lacking[0]} has no {module}"
+            raise expected("--scheduler", found, "workers with it on their PYTHONPATH")
+
     def why_waiting(self) -> str:
         """Return a sentence if no worker is left; Dask waits until one comes."""
         with suppress(OSError):  # a scheduler that goes away meanwhile is told of by the batches
@@ -121,10 +135,10 @@ class DaskExecutor(Executor):
             answer.set_exception(self._unlike(error) or error)
 
     def _unlike(self, error: Exception) -> InputError | None:
-        """Return an error in one line if the scheduler or a worker could not import what was sent."""
+        """Return an error in one line if the scheduler could not import what was sent."""
         if not isinstance(error, ImportError) and "deserializ" not in str(error):
             return None
-        found = f"{self._where}, where something sent could not be imported ({error})".partition("\n")[0]
+        found = f"{self._where}, where what was sent can not be imported"
         return expected(
             "--scheduler", found, "scheduler and workers with all that is installed here, or on PYTHONPATH"
         )
@@ -144,6 +158,14 @@ def run_as_here(kernels: str, fn: Callable[..., Any], *args: Any, **kwargs: Any)
     if kernels != CACHE.name:
         raise expected("workers", f"another gecar or Numba ({CACHE.name})", f"the same as here ({kernels})")
     return fn(*args, **kwargs)
+
+
+def importable(module: str) -> bool:
+    """Say whether a module is there."""
+    try:
+        return find_spec(module) is not None
+    except ImportError:  # of the package it would be in
+        return False
 
 
 def itself(recipe: Recipe) -> Recipe:
