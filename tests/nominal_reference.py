@@ -11,8 +11,8 @@ GRAVITY, SWEEPS, DT = 9.81, 3, 0.002
 
 def _turned(cos, sin, angle):
     a2 = angle * angle
-    sine = angle * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0)))
-    cosine = 1.0 - 0.5 * a2 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0)))
+    sine = angle * (1.0 + a2 * (-1.0 / 6.0 + a2 * (1.0 / 120.0 + a2 * (-1.0 / 5040.0))))
+    cosine = 1.0 + a2 * (-0.5 + a2 * (1.0 / 24.0 + a2 * (-1.0 / 720.0 + a2 * (1.0 / 40320.0))))
     return cos * cosine - sin * sine, sin * cosine + cos * sine
 
 
@@ -56,9 +56,9 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
         u, w = vx * cos + vy * sin, vy * cos - vx * sin
         wl, wr = keep * wl + gain * dl * voltage, keep * wr + gain * dr * voltage
         caster = min(
-            max(caster_static + (pl + pr) / DT * (-body.com_height / body.caster_ahead), 0.0), weight
+            max(caster_static + (pl + pr) * (1.0 / DT) * (-body.com_height / body.caster_ahead), 0.0), weight
         )
-        wheel, shift = 0.5 * (weight - caster), (ql + qr) / DT * (body.com_height / body.track_width)
+        wheel, shift = 0.5 * (weight - caster), (ql + qr) * (1.0 / DT) * (body.com_height / body.track_width)
         loads = [min(max(wheel - shift, 0.0), 2.0 * wheel), min(max(wheel + shift, 0.0), 2.0 * wheel)]
         circles = [robot.tyre.friction * DT * load for load in loads]
         pl = pr = ql = qr = fl = fr = 0.0
@@ -74,8 +74,8 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
                 new_l = pl + (m_own * sl + m_both * sr + m_side * ss)
                 new_r = pr + (m_own * sr + m_both * sl + -m_side * ss)
                 side = m_side * sl + -m_side * sr + m_ss * ss
-                grip = max(circles[0] + circles[1], 1e-30)
-                new_ql, new_qr = ql + side * (circles[0] / grip), qr + side * (circles[1] / grip)
+                share = side / max(circles[0] + circles[1], 1e-30)
+                new_ql, new_qr = ql + share * circles[0], qr + share * circles[1]
             elif not slides_l:
                 new_l, new_ql = pl + (n_own * sl + n_side * ss), ql + (n_side * sl + n_ss * ss)
             elif not slides_r:

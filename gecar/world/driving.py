@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import compiled
+from gecar.compiled import compiled, on_stack
 from gecar.world.chipmunk import SPACE, engine_step
 from gecar.world.dynamics import drift, step, turn
 from gecar.world.interpreter import Floor, look, run_program, see
@@ -42,8 +42,7 @@ def advance(
         commands[:] = 0.0
     commands[n & (RING - 1)] = left
     commands[RING + (n & (RING - 1))] = right
-    late = p.actuation_delay / c.dt + 0.5
-    step(s, delayed(commands, 0, n, late), delayed(commands, RING, n, late), p, c)
+    step(s, delayed(commands, 0, n, c.late), delayed(commands, RING, n, c.late), p, c)
     if engine[SPACE] != 0:
         turn(s, engine_step(s, c.dt, engine, buffer, count) - s.half_turn)
     else:
@@ -53,8 +52,8 @@ def advance(
 @compiled
 def _tile_at(x: float, y: float, floor: Floor) -> int:
     """Return the index of the tile a point lies on, -1 outside the field."""
-    column = int(np.floor(x / floor.tile))
-    row = int(np.floor(y / floor.tile))
+    column = int(np.floor(x * floor.per_tile))
+    row = int(np.floor(y * floor.per_tile))
     if column < 0 or row < 0 or column >= floor.columns or row >= floor.rows:
         return -1
     return row * floor.columns + column
@@ -121,7 +120,37 @@ def drive(
     tuple
         (outcome, step it ended at, tiles of the sequence passed).
     """
-    p, c, s, k, e = physics[0], derived[0], state[0], control[0], eyes[0]
+    s = on_stack(state[0])
+    result = _drive(
+        program, physics[0], derived[0], s, control[0], floor, start, first, last, limit, passed, eyes[0],
+        commands, engine, buffer, count, arrival, trace, every,
+    )  # fmt: skip
+    state[0] = s
+    return result
+
+
+@compiled
+def _drive(
+    program: npt.NDArray[np.int32],
+    p: Any,
+    c: Any,
+    s: Any,
+    k: Any,
+    floor: Floor,
+    start: npt.NDArray[np.float64],
+    first: int,
+    last: int,
+    limit: int,
+    passed: int,
+    e: Any,
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+    arrival: npt.NDArray[np.float64],
+    trace: npt.NDArray[np.float64],
+    every: int,
+) -> tuple[int, int, int]:
     if first == 0:
         place(s, p, start[0], start[1], start[2])
         k.row = k.due_step = k.line = 0

@@ -27,8 +27,10 @@ class Floor(NamedTuple):
     ----------
     averaged
         Brightness averaged over the sensor's spot, shape (rows, columns), 255 bare and 0 line, row 0 at the bottom.
-    pitch, tile
-        Size of a raster cell and of a tile [m].
+    pitch
+        Size of a raster cell [m].
+    per_tile
+        Tiles in a metre [1/m].
     columns, rows
         Tiles across and up.
     drivable
@@ -39,7 +41,7 @@ class Floor(NamedTuple):
 
     averaged: npt.NDArray[np.float32]
     pitch: float
-    tile: float
+    per_tile: float
     columns: int
     rows: int
     drivable: npt.NDArray[np.bool_]

@@ -130,7 +130,7 @@ class World:
         return Floor(
             course.averaged(spot),
             course.pitch_m,
-            course.tile_size_m,
+            1.0 / course.tile_size_m,
             course.columns,
             course.rows,
             course.drivable,

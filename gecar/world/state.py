@@ -22,7 +22,7 @@ _STATE_FIELDS = (
     "half_turn u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
 )
 _DERIVED_FIELDS = (
-    "dt mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
+    "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain slew "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
     "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
@@ -49,6 +49,8 @@ def derive(p: Any, dt: float, c: Any) -> None:
         Record of dtype `DERIVED`, overwritten.
     """
     c.dt = dt
+    c.inv_dt = 1.0 / dt
+    c.late = p.actuation_delay / dt + 0.5  # steps a command is late: half a one, as velocities are
     c.mass = p.mass
     c.inv_mass = 1.0 / p.mass
     c.inv_inertia = 1.0 / p.yaw_inertia
