@@ -30,7 +30,7 @@ class RobustEvaluator:
     Racing: the robots drive one after the other, and the first that misses GOAL ends it with eq. 1's 10^4. A program
     that has fallen `MARGIN` behind the best so far after `LEAST_DRIVES` robots drives no further either: its fitness
     is the mean or the worst of those it drove. So the best is always driven on all robots, and 10 robots cost about
-    three times what one does (`benchmarks/robustness.py`).
+    twice what one does (`benchmarks/robustness.py`).
 
     Attributes
     ----------
