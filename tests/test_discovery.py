@@ -118,7 +118,9 @@ def test_breakaway_friction_is_looked_for_within_the_speeds_recorded(share: floa
     slow = replace(
         run, left_angle_rad=run.left_angle_rad * share, right_angle_rad=run.right_angle_rad * share
     )
-    speeds = [start["speed_rad_s"] for start in starts("static_friction", EV3, [slow])]
+    speeds = [
+        start["speed_rad_s"] for start in starts("static_friction", EV3, [slow], lambda values: np.zeros(9))
+    ]
     assert min(speeds) == pytest.approx(first, abs=0.1)
     assert max(speeds) == pytest.approx(3.0) if first else max(speeds) < 0.3
 
@@ -133,7 +135,9 @@ def test_every_effect_has_places_to_start_from_whichever_columns_are_missing(
     blind = replace(run, **{name: np.full_like(getattr(run, name), np.nan) for name in missing})
     for effect in CATALOGUE:
         freedom = free(EV3, [effect.id])
-        assert all(np.isfinite(freedom.vector({effect.id: s})).all() for s in starts(effect.id, EV3, [blind]))
+        begun = starts(effect.id, EV3, [blind], lambda values: np.array(list(values.values())))
+        assert begun or effect.id == "slippery_patch"
+        assert all(np.isfinite(freedom.vector({effect.id: s})).all() for s in begun)
 
 
 def test_a_bench_needs_no_camera() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,7 +86,12 @@ def _screen(fits: Fits, recordings: Sequence[Recording], model: Model, effect: s
     """Score an effect without fitting it: by its slopes at the model, and by trying its starts."""
     freedom = free(fits.robot, (*model.effects, effect))
     residual = fits.residual(freedom, model.shift)
-    places = [freedom.vector({**model.values, effect: v}) for v in starts(effect, fits.robot, recordings)]
+
+    def place(values: Mapping[str, float]) -> Array:
+        return freedom.vector({**model.values, effect: values})
+
+    begun = starts(effect, fits.robot, recordings, lambda values: residual(place(values)))
+    places = [place(values) for values in begun]
     if not places:
         return None
     found = np.array([cost(residual(z)) for z in places])

@@ -1,17 +1,20 @@
 """Where identification starts looking for an effect: values of its parameters worth a try.
 
 Most effects are found from a few sizes on both sides of neutral. Some have a landscape with many valleys, and are
-scanned: a slippery patch by place, a ripple by its cycles, a dead band by its edge.
+scanned: a slippery patch by place, a ripple by its cycles, a dead band by its edge. A replay of all recordings takes
+milliseconds, so where a scan needs to see what it does, it replays.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting import cost, weights
 from gecar.reality.freedom import Coordinate, free, torque_scale
 from gecar.reality.recording import Recording
 from gecar.world.effects import BY_ID
@@ -23,10 +26,27 @@ Values = Mapping[str, float]
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (3.0, 12.0)  # in steps worth a name
+PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 
 
-def starts(effect_id: str, robot: Robot, recordings: Sequence[Recording]) -> list[Values]:
-    """Return values of an effect's parameters to start from, by label."""
+def starts(
+    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> list[Values]:
+    """Return values of an effect's parameters to start from, by label.
+
+    Parameters
+    ----------
+    effect_id
+        Of the effect.
+    robot
+        As far as it is known.
+    recordings
+        Of that robot.
+    errors
+        Returns the residuals under the effect with given values.
+    """
+    if effect_id in _TRIED:
+        return list(_TRIED[effect_id](robot, recordings, errors))
     special = _SPECIAL.get(effect_id)
     if special is not None:
         return list(special(robot, recordings))
@@ -82,15 +102,52 @@ def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values
         yield {"duty_pct": float(edge), "offset_share": 0.0}
 
 
-def _ripple(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
-    """Scan cycles of which the shafts have turned two at least: less could be any force along the way."""
-    turned = max(float(np.nanmax(np.ptp(_known(r), axis=0))) for r in recordings) / (2.0 * math.pi)
-    size = 0.01 * torque_scale(robot)
+def _ripple(
+    robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> Iterator[Values]:
+    """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
+
+    Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
+    either shaft do, and least squares gives both phases at once.
+    """
+    turned = max(_turned(r, robot) for r in recordings)
+    size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
+    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
+    w = np.sqrt(weights(bare))
     for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
         if cycles * turned < LEAST_CYCLES:
             continue
-        for phase in (-0.75 * math.pi, -0.25 * math.pi, 0.25 * math.pi, 0.75 * math.pi):
-            yield {"amplitude_nm": size, "cycles_per_rev": float(cycles), "phase_rad": phase}
+        pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
+        sines, sine, cosines, cosine = (w * (errors(_rippled(cycles, *p, size)) - bare) for p in pairs)
+        basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
+        a, b, c, d = -np.linalg.lstsq(basis, w * bare, rcond=None)[0]
+        amplitude = 0.5 * size * (math.hypot(a, b) + math.hypot(c, d))
+        for share in (
+            1.0,
+            2.0,
+            4.0,
+        ):  # a strong ripple runs the simulation out of step: least squares asks too little
+            yield _rippled(cycles, math.atan2(b, a), math.atan2(d, c), share * amplitude)
+
+
+def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[str, float]:
+    lead = math.remainder(right - left, math.tau) / cycles
+    return {
+        "amplitude_nm": amplitude,
+        "cycles_per_rev": float(cycles),
+        "phase_rad": left,
+        "right_lead_rad": lead,
+    }
+
+
+def _turned(recording: Recording, robot: Robot) -> float:
+    """Return how far a shaft has turned at least [revolutions], by its angles or else by the path."""
+    angles = np.ptp(_known(recording), axis=0).max()
+    path = np.column_stack([recording.x_m, recording.y_m])
+    driven = np.hypot(*np.diff(path[~np.isnan(path).any(axis=1)], axis=0).T).sum() / float(
+        robot.physics["wheel_radius"][0]
+    )
+    return float(angles or driven) / math.tau
 
 
 def _known(recording: Recording) -> Array:
@@ -98,14 +155,30 @@ def _known(recording: Recording) -> Array:
     return np.nan_to_num(np.column_stack([recording.left_angle_rad, recording.right_angle_rad]))
 
 
-def _patch(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
-    """Scan the floor where the robot has been, on a grid a patch can not slip through."""
+def _patch(
+    robot: Robot,  # noqa: ARG001
+    recordings: Sequence[Recording],
+    errors: Callable[[Values], Array],
+) -> Iterator[Values]:
+    """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
     places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
     if not len(places):
         return
-    cells = np.unique(np.round(places / 0.15).astype(int), axis=0) * 0.15
-    for x, y in cells[np.unique(np.linspace(0, len(cells) - 1, 60).astype(int))]:
-        yield {"radius_m": 0.15, "x_m": float(x), "y_m": float(y), "coefficient": 0.15}
+    cells = np.unique(np.round(places / PATCH_PITCH_M).astype(int), axis=0) * PATCH_PITCH_M
+    cells = cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))]
+    tried = [{"radius_m": 0.1, "x_m": float(x), "y_m": float(y), "coefficient": 0.15} for x, y in cells]
+    tried.sort(key=lambda values: cost(errors(values)))
+    half = 0.5 * PATCH_PITCH_M
+    for values, radius, grip in itertools.product(
+        tried[:BEST_CELLS], (0.1, 0.15, 0.2, 0.3), (0.06, 0.15, 0.3)
+    ):
+        for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
+            yield {
+                "radius_m": radius,
+                "coefficient": grip,
+                "x_m": values["x_m"] + dx,
+                "y_m": values["y_m"] + dy,
+            }
 
 
 def _speed_limit(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
@@ -140,8 +213,6 @@ def _positive(*labels_sizes: tuple[str, tuple[float, ...]]) -> list[Values]:
 _SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = {
     "static_friction": _static,
     "dead_band": _dead_band,
-    "torque_ripple": _ripple,
-    "slippery_patch": _patch,
     "speed_limit": _speed_limit,
     "command_slew": _slew,
     "line_shift": _line,
@@ -152,4 +223,8 @@ _SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = 
     "tyre_friction": lambda robot, recordings: _positive(("coefficient", (0.6, 0.35, 0.15, 1.2))),  # noqa: ARG005
     "sensor_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
     "sensor_lag": lambda robot, recordings: _positive(("time_constant_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
+}
+_TRIED: dict[str, Callable[[Robot, Sequence[Recording], Callable[[Values], Array]], Iterable[Values]]] = {
+    "torque_ripple": _ripple,
+    "slippery_patch": _patch,
 }

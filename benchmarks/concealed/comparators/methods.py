@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
@@ -68,7 +68,12 @@ def _begun(selection: Selection, model: Model, effect: str) -> tuple[float, Effe
     """Return what one more effect promises to gain, and the best of its starts."""
     freedom = free(selection.robot, (*model.effects, effect))
     residual = selection.residual(freedom)
-    places = [{**model.values, effect: v} for v in starts(effect, selection.robot, selection.recordings)]
+
+    def errors(values: Mapping[str, float]) -> Array:
+        return residual(freedom.vector({**model.values, effect: values}))
+
+    begun = starts(effect, selection.robot, selection.recordings, errors)
+    places = [{**model.values, effect: v} for v in begun]
     costs = [cost(residual(freedom.vector(values))) for values in places]
     gain = model.cost - min(costs, default=math.inf)
     return max(gain, _promise(selection, model, effect)), places[int(np.argmin(costs))] if places else {}
