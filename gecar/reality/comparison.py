@@ -148,6 +148,11 @@ class Comparison:
         return np.clip(np.nan_to_num(everything[self._keep], nan=1e3), -1e3, 1e3)
 
     @property
+    def reading_sd(self) -> Array:
+        """How uncertain each residual of sight is, the path's part included [%], shape (n,); known after `errors`."""
+        return np.concatenate([strip.reading_sd for strip in self.strips])[self._keep]
+
+    @property
     def offsets(self) -> Array:
         """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
         return np.array([strip.film.offset_s for strip in self.strips])

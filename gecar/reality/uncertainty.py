@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting import cost, weights
+from gecar.reality.levels import level_spans
 from gecar.reality.model import Model
 from gecar.reality.selection import Selection
 from gecar.reality.verdict import Interval
@@ -15,9 +16,9 @@ Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96
 SYSTEMATIC = 0.02  # of an effect's size: against the 3D engine, fitted parameters come back within so much
 SYSTEMATIC_STEP = 0.15  # of the smallest size worth a name
-# Gears that give add to their play: 0.3 to 0.8 degrees there. Clipped readings bind gain and offset to each other.
-MORE_SYSTEMATIC = {"backlash": 0.12, "sensor_gain": 0.12, "sensor_offset": 0.2, "dead_band": 0.05}
-MORE_STEP = {"backlash": 0.6, "sensor_offset": 1.0}
+# Gears that give add to their play: 0.3 to 0.8 degrees there.
+MORE_SYSTEMATIC = {"backlash": 0.12, "dead_band": 0.05}
+MORE_STEP = {"backlash": 0.6}
 FLAT = 2.0  # coordinates: a deviation so large comes from slopes that say nothing
 NOTICED = 12.0  # of cost: what walking along a flat parameter must not raise it by
 
@@ -53,11 +54,14 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
         return {}
     out: dict[str, dict[str, Interval]] = {}
     low, high = model.freedom.bounds
+    spans = level_spans(selection, model)
     for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
         z = float(model.fit.z[k])
         step = MORE_STEP.get(c.parameter.field, SYSTEMATIC_STEP) if c.parameter.worthwhile > 0.0 else 0.0
         size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + step
-        if sd > FLAT:
+        if k in spans:
+            down, up = spans[k]
+        elif sd > FLAT:
             down, up = (
                 _walked(selection, model, k, side, abs(end - z))
                 for side, end in ((-1.0, low[k]), (1.0, high[k]))
