@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,15 +27,22 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
-from gecar.reality.comparison import CHANNELS
+from gecar.reality.comparison import CHANNELS, Strip
 from gecar.reality.discovery import Evidence
+from gecar.reality.loudness import STRETCH_S, stretch_errors
 from gecar.reality.verdict import Place, Verdict
 from gecar.world.course import load_course
 
 Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
 
-_SCALES = {"left_angle": (0, "left wheel [deg]"), "right_angle": (1, "right wheel [deg]"), "x": (0, "x [mm]"),
-           "y": (1, "y [mm]"), "heading": (2, "heading [deg]")}  # fmt: skip
+_DEG = 180.0 / np.pi
+# Name and unit of each channel's errors, that unit in the channel's own, and whether traces always show it.
+_SHOWN = {
+    "left_angle": ("left wheel [deg]", _DEG, True), "right_angle": ("right wheel [deg]", _DEG, True),
+    "battery": ("battery [V]", 1.0, False), "yaw_rate": ("gyro [deg/s]", _DEG, False), "x": ("x [mm]", 1e3, True),
+    "y": ("y [mm]", 1e3, True), "heading": ("heading [deg]", _DEG, True), "reflection": ("reflection [%]", 1.0, False),
+}  # fmt: skip
 SHOWN_REGIMES = 12
 
 
@@ -143,53 +151,52 @@ def tried_figure(verdict: Verdict) -> Figure:
 
 
 def traces_figure(verdict: Verdict) -> Figure:
-    """Draw the following replay's residuals in the recording where mismatch shows most, spans marked."""
+    """Draw what replays of short stretches leave in the recording where mismatch shows most, its spans marked."""
     evidence: Evidence = verdict.evidence
     place = verdict.located[0] if verdict.located else None
     strip = next(
         (s for s in evidence.strips if place and s.recording.name == place.recording), evidence.strips[0]
     )
-    film = strip.film
-    before, after = film.play(evidence.before.physics), film.play(verdict.robot.physics)
-    seen = [name for name in _SCALES if _has(strip, name)]
-    figure = new_figure(9.0, 2.0 + 1.1 * len(seen))
+    taken = evidence.moved.taken
+    before = _traces(strip, evidence.before.physics, taken.freedom.physics(taken.fit.z))
+    after = _traces(strip, verdict.robot.physics, verdict.robot.physics)
+    loudest = f"; shaded: where {place.channel.replace('_', ' ')} is loudest" if place else ""
+    pointed = {p.channel for p in verdict.located}
+    seen = [name for name in before if _SHOWN[name][2] or name in pointed]
+    figure = new_figure(9.0, 2.2 + 1.1 * len(seen))
     with look():
         for number, name in enumerate(seen):
             axes = figure.add_subplot(len(seen), 1, number + 1)
             _mark(axes, place)
             for run, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
-                t, values = _series(strip, run, name)
-                axes.plot(t, values, color=colour, linewidth=0.9, label=label)
-            axes.set(ylabel=_SCALES[name][1], xlim=(0, film.t[-1]))
+                axes.plot(*run[name], color=colour, linewidth=0.9, label=label)
+            axes.set(ylabel=_SHOWN[name][0], xlim=(0, strip.film.t[-1]))
             axes.tick_params(labelbottom=name == seen[-1])
             if number == 0:
-                axes.legend(loc="upper right", ncols=2)
+                axes.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
         if seen:
             axes.set_xlabel("time [s]")
         headline(
             figure,
             f"Measured less simulated, in {strip.recording.name}",
-            "replay re-based over about a second",
+            f"replays of {STRETCH_S:g} s, each from where the robot was" + loudest,
         )
     return figure
 
 
-def _has(strip: object, name: str) -> bool:
-    film = strip.film  # type: ignore[attr-defined]
-    k = _SCALES[name][0]
-    if name.endswith("angle"):
-        return not bool(np.isnan(film.reel.measured[:, k]).all())
-    return len(film.reel.pose_t) > 0 and not bool(np.isnan(film.reel.pose[:, k]).all())
-
-
-def _series(strip: object, run: tuple[Array, Array, Array, Array], name: str) -> tuple[Array, Array]:
-    film = strip.film  # type: ignore[attr-defined]
-    _, row_errors, poses, _ = run
-    k = _SCALES[name][0]
-    if name.endswith("angle"):
-        return film.t, np.degrees(row_errors[:, k] * film.reel.sd[0])
-    difference = film.reel.pose[:, k] - poses[:, k]
-    return film.reel.pose_t, np.degrees(difference) if name == "heading" else 1e3 * difference
+def _traces(strip: Strip, motion: Physics, sight: Physics) -> dict[str, tuple[Array, Array]]:
+    """Return times and errors by channel, in the units shown; stretches are parted by a gap."""
+    sd = strip.film.reel.sd[[0, 0, 1, 2, 3, 3, 4]]
+    out = {}
+    for channel, t, errors in stretch_errors(strip, motion):
+        if len(t):
+            name = CHANNELS[channel]
+            cuts = 1 + np.flatnonzero(np.diff((t / STRETCH_S).astype(int)))
+            values = _SHOWN[name][1] * sd[channel] * errors
+            out[name] = (np.insert(t, cuts, np.nan), np.insert(values, cuts, np.nan))
+    if strip.looks:
+        out["reflection"] = (strip.film.t, strip.recording.reflection_pct - strip.readings(sight))
+    return out
 
 
 def _mark(axes: Axes, place: Place | None) -> None:

@@ -23,6 +23,7 @@ from gecar.reality.fitting import cost
 from gecar.reality.formula import Formula, describe
 from gecar.reality.holdout import Misfit, Split, judge, split
 from gecar.reality.known_robot import known_robot
+from gecar.reality.levels import levelled
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
 from gecar.reality.noise import Noise, estimate_noise
@@ -140,7 +141,7 @@ def discover(
     if sight and seen:
         more, others = _found(shop, sight, seen, found_robot)
         found, rivals = found + more, rivals + others
-    where = _map(shop, motion, sight)
+    where = _map(shop, found_robot, motion, moved, seen)
     unexplained = moved.unexplained or bool(seen and seen.unexplained)
     return Verdict(
         case=case.name,
@@ -208,7 +209,8 @@ def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection
         moved.taken.values
     )  # a late camera, a skewed clock shift what is seen, too
     selection = Selection(comparison, known, SIGHT, shop.split.fitted, shop.seed, shop.tell)
-    return selection, explain(selection)
+    seen = explain(selection)
+    return selection, replace(seen, taken=levelled(selection, seen.taken))
 
 
 def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
@@ -268,12 +270,13 @@ def _found(
     return tuple(out), tuple(rivals)
 
 
-def _map(shop: _Workshop, motion: Selection, sight: Selection | None) -> Map:
-    parts = [(motion.nothing.fit.errors, motion.cells)]
-    if sight is not None:
-        where = np.array([shop.strips.index(s) for s in sight.comparison.strips], np.int32)
-        parts.append((sight.nothing.fit.errors, replace(sight.cells, recording=where[sight.cells.recording])))
-    return Map(shop.strips, parts, shop.robot.physics)
+def _map(
+    shop: _Workshop, found: Robot, motion: Selection, moved: Explanation, seen: Explanation | None
+) -> Map:
+    explained = (not moved.unexplained, not (seen and seen.unexplained))
+    mover = moved.taken.freedom.physics(moved.taken.fit.z)
+    nothing = motion.nothing.fit.errors
+    return Map(shop.strips, nothing, motion.cells, shop.robot.physics, mover, found.physics, explained)
 
 
 def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:

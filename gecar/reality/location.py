@@ -3,65 +3,132 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import norm
 
 from gecar.reality.comparison import CHANNELS, Cells, Strip
+from gecar.reality.loudness import loudness, typical
 from gecar.reality.regimes import regime_masks
 from gecar.reality.verdict import Place
 
 Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
 
 BIN_S = 0.1
 SHIFTS = 499
+SURE = 0.05
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
 PLACE_RADII_M = (0.1, 0.2, 0.3)
+SPAN_BINS = 2  # bins a span is made of
+LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
+SIGHT = 7
+GROUPS = ([0, 1], [2], [3], [4, 5, 6], [SIGHT])  # channels that one sensor measures: they are loud together
+_GROUP = np.repeat(range(len(GROUPS)), [len(group) for group in GROUPS])
 
 
 class Map:
     """Whitened energy of a case by channel, recording and time.
 
+    Parameters
+    ----------
+    strips
+        The recordings.
+    errors, cells
+        Residuals of motion of the robot as it was known, and where they come from.
+    before, after
+        Physics records of the robot as it was known, and with what was found; of sight, both know what was found to
+        move it, for its path is the same.
+    moved
+        Physics record with what was found to move the robot.
+    explained
+        Whether motion and sight are explained: then what an effect takes away is what it did; else all there is counts.
+
     Attributes
     ----------
     energy
-        Mean square of a bin's residuals, less noise, shape (channels, recordings, bins); 0 where nothing was measured.
+        Summed squares of a bin's innovations, less noise, shape (channels, recordings, bins); 0 where nothing was
+        measured: it is high where an error begins. What was seen has no innovations: there it is what `loud` is.
+    loud
+        What a mismatch adds up to over a stretch (see `gecar.reality.loudness`), in variances of noise, shape (groups
+        of channels, recordings, spans).
     masks
         Regimes by name, each of shape (recordings, bins).
     """
 
     def __init__(
-        self, strips: Sequence[Strip], parts: Sequence[tuple[Array, Cells]], physics: npt.NDArray[np.void]
+        self,
+        strips: Sequence[Strip],
+        errors: Array,
+        cells: Cells,
+        before: Physics,
+        moved: Physics,
+        after: Physics,
+        explained: tuple[bool, bool] = (True, True),
     ) -> None:
         self.strips = tuple(strips)
-        self.bins = max(int(s.film.t[-1] / BIN_S) + 1 for s in strips)
+        self.bins = SPAN_BINS * max(int(s.film.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in strips)
         shape = (len(CHANNELS), len(strips), self.bins)
         total, count = np.zeros(shape), np.zeros(shape)
-        for errors, cells in parts:
-            at = (cells.channel, cells.recording, np.minimum((cells.t_s / BIN_S).astype(int), self.bins - 1))
-            np.add.at(total, at, np.clip(errors, -CLIP, CLIP) ** 2 - 1.0)
-            np.add.at(count, at, 1.0)
+        at = (cells.channel, cells.recording, np.minimum((cells.t_s / BIN_S).astype(int), self.bins - 1))
+        np.add.at(total, at, np.clip(errors, -CLIP, CLIP) ** 2 - 1.0)
+        np.add.at(count, at, 1.0)
+        loud, seen = self._loud(before, moved, after, explained)
+        total[SIGHT], count[SIGHT] = loud[SIGHT], seen[SIGHT]
         self.energy = np.where(count > 0, total, 0.0)
         self.samples = count
-        self.masks, self.path = regime_masks(self.strips, physics, self.bins, BIN_S)
+        self.masks, self.path = regime_masks(self.strips, before, self.bins, BIN_S)
+        self._motion_explained = explained[0]
+        spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
+        self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
+
+    def _loud(
+        self, before: Physics, moved: Physics, after: Physics, explained: tuple[bool, bool]
+    ) -> tuple[Array, Array]:
+        """Return what a mismatch adds up to over a stretch, and the samples, by channel, recording and bin."""
+        sums = [loudness(s, before, moved, after, self.bins, BIN_S) for s in self.strips]
+        was, left, samples, added = (np.stack([one[k] for one in sums], axis=1) for k in range(4))
+        noise = typical(added, samples, explained[0])[:, None, None]
+        # Sight that needs no explanation is the path's noise; motion that needs none may still be told apart.
+        known = np.array(
+            [explained[0] and bool((was[:SIGHT] != left[:SIGHT]).any())] * SIGHT + [explained[1]]
+        )
+        taken = np.where(known[:, None, None], (was - left) / noise, was / noise - samples)
+        return np.where(samples > 0, taken, 0.0), samples
 
     def places(self, rng: np.random.Generator) -> tuple[Place, ...]:
-        """Return where energy gathers more than chance lets it, the most telling first."""
+        """Return where energy gathers more than chance lets it: the loudest sensor first, its most telling regime."""
         excess = np.maximum(self.energy.sum(axis=(1, 2)), 0.0)
         mean = excess / np.maximum(self.samples.sum(axis=(1, 2)), 1.0)
+        order = self._order()
         found = []
         for channel in np.flatnonzero((mean > WORTH) & (excess > 0.02 * excess.max())):
-            for name, mask in self.masks.items():
-                entry = self._judge(int(channel), name, mask, rng)
-                if entry is not None:
-                    found.append((excess[channel] * entry[0], entry[1]))
-            spot = self._spot(int(channel), rng)
-            if spot is not None:
-                found.append((excess[channel] * spot[0], spot[1]))
-        found.sort(key=lambda pair: -pair[0])
-        return tuple(place for _, place in found[:MOST])
+            entries = [self._judge(int(channel), name, mask, rng) for name, mask in self.masks.items()]
+            entries.append(self._spot(int(channel), rng))
+            group = order.index(_GROUP[channel])
+            found += [(group, excess[channel] * telling, place) for telling, place in filter(None, entries)]
+        if order and not any(group == 0 for group, _, _ in found):
+            last = self._throughout(max(GROUPS[order[0]], key=lambda k: excess[k]))
+            found += [(0, 0.0, last)] if last.p <= SURE else []
+        found.sort(key=lambda entry: (entry[0], -entry[1]))
+        return tuple(place for _, _, place in found[:MOST])
+
+    def _order(self) -> list[int]:
+        """Return the groups of channels that were measured, the loudest first.
+
+        Where motion itself is not explained, nor is the path to be trusted: what was seen along it comes last.
+        """
+        loud = self.loud.sum(axis=(1, 2))
+        if not self._motion_explained:
+            loud[-1] = loud.min() - 1.0
+        if (loud <= 0.0).all():
+            loud = np.array([self.energy[group].sum() for group in GROUPS])
+        there = [k for k, group in enumerate(GROUPS) if self.samples[group].any()]
+        return sorted(there, key=lambda k: -loud[k])
 
     def _judge(
         self, channel: int, name: str, mask: npt.NDArray[np.bool_], rng: np.random.Generator,
@@ -78,9 +145,9 @@ class Map:
         share = inside / whole
         drawn = _shifted(energy, mask, rng)
         p = float((1 + np.sum(drawn >= inside)) / (1 + SHIFTS))
-        if p > 0.05 or share <= covered:
+        if p > SURE or share <= covered:
             return None
-        loud, spans = self._spans(channel, mask)
+        loud, spans = self._spans(channel)
         place = Place(
             CHANNELS[channel],
             name,
@@ -92,24 +159,26 @@ class Map:
         )
         return float((share - covered) * np.sqrt(share)), place
 
-    def _spans(
-        self, channel: int, mask: npt.NDArray[np.bool_]
-    ) -> tuple[int, tuple[tuple[float, float], ...]]:
-        """Return the loudest recording within a regime, and the spans that hold most of its energy."""
-        group = _GROUPS[channel]
-        energy = np.maximum(self.energy[list(group)].sum(axis=0), 0.0)
-        chosen = np.where(mask, energy, 0.0)
-        loud = int(np.argmax(chosen.sum(axis=1)))
-        order = np.argsort(-chosen[loud])
-        gathered = np.cumsum(chosen[loud][order])
-        kept = np.zeros(self.bins, bool)
-        kept[order[: 1 + int(np.searchsorted(gathered, 0.6 * gathered[-1]))]] = True
-        edges = np.flatnonzero(np.diff(np.r_[0, kept.astype(int), 0]))
-        spans = [
-            (round(float(a) * BIN_S, 2), round(float(b) * BIN_S, 2))
-            for a, b in zip(edges[::2], edges[1::2], strict=True)
-        ]
-        return loud, tuple(spans)
+    def _spans(self, channel: int) -> tuple[int, tuple[tuple[float, float], ...]]:
+        """Return the recording in which a channel's sensor is loudest, and its loudest spans there."""
+        loud = np.maximum(self.loud[_GROUP[channel]], 0.0)
+        order = np.argsort(-loud, axis=None)
+        gathered = np.cumsum(loud.ravel()[order])
+        kept = np.zeros(loud.size, bool)
+        kept[order[: 1 + int(np.searchsorted(gathered, LOUDEST * gathered[-1]))]] = True
+        kept = kept.reshape(loud.shape)
+        loudest = int(np.argmax(np.where(kept, loud, 0.0).sum(axis=1)))
+        edges = np.flatnonzero(np.diff(np.r_[0, kept[loudest].astype(int), 0])) * SPAN_BINS * BIN_S
+        pairs = zip(edges[::2], edges[1::2], strict=True)
+        return loudest, tuple((round(float(a), 2), round(float(b), 2)) for a, b in pairs)
+
+    def _throughout(self, channel: int) -> Place:
+        """Return the entry of a channel that is off whatever the motion: the last resort."""
+        count = self.samples[channel].sum()
+        p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + SHIFTS))
+        loud, spans = self._spans(channel)
+        name = self.strips[loud].recording.name
+        return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
 
     def _spot(self, channel: int, rng: np.random.Generator) -> tuple[float, Place] | None:
         """Return the disc on the floor that holds most energy beyond its share of the time."""
@@ -144,6 +213,3 @@ def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generato
     shifts = rng.integers(0, bins, (SHIFTS, len(energy)))
     drawn: Array = inside[np.arange(len(energy)), shifts].sum(axis=1)
     return drawn
-
-
-_GROUPS = {0: (0, 1), 1: (0, 1), 2: (2,), 3: (3,), 4: (4, 5, 6), 5: (4, 5, 6), 6: (4, 5, 6), 7: (7,)}
