@@ -92,9 +92,7 @@ def explain(selection: Selection) -> Explanation:
             step for step in first[1:WAYS] if step.worthwhile and step.gain > FAR_BEHIND * first[0].gain
         ]
         ways += [way for way in (_chain(selection, [step]) for step in others) if way is not None]
-    best = min(
-        ways, key=lambda way: (not way.steps, way.model.cost + sum(step.null_95 for step in way.steps))
-    )
+    best = _best_way(selection, [way for way in ways if way.steps] or ways)
     kept = list(best.steps)
     tried = [tuple(first), *best.tried[1:]]
     taken = _settled(selection, kept, tried)
@@ -114,6 +112,18 @@ class _Way:
     model: Model
     tried: tuple[tuple[Step, ...], ...]
     nearly: bool
+
+
+def _best_way(selection: Selection, ways: list[_Way]) -> _Way:
+    """Return the way with the fewest effects, unless a longer one explains a good part of what that leaves."""
+    floor = _limits(selection).floor * selection.blocks.count
+    ways = sorted(ways, key=lambda way: (len(way.steps), way.model.cost))
+    best = ways[0]
+    for way in ways[1:]:
+        longer = len(way.steps) > len(best.steps)
+        if longer and max(way.model.structure, floor) < (1.0 - MAIN_SHARE) * max(best.model.structure, floor):
+            best = way
+    return best
 
 
 def _chain(selection: Selection, first: list[Step]) -> _Way | None:
@@ -159,7 +169,8 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
     """
     if not kept:
         return selection.nothing
-    best = kept[-1].model
+    best, null = kept[-1].model, kept[-1].null_95  # of what is left at the end; earlier ones are of what was
+    floor = _limits(selection).floor * selection.blocks.count
     rivals = {step.effect: step for stage in tried for step in stage[:SWAPPED]}
     for number, step in enumerate(list(kept)):
         if len(kept) < 2:
@@ -170,14 +181,14 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
             rest = [e for e in best.effects if e != step.effect]
             values = {**best.values, **other.model.values}
             swapped = selection.refit((*rest, other.effect), values, shift=best.shift)
-            if swapped.cost < best.cost - step.null_95 and worthwhile(swapped, other.effect):
+            if swapped.cost < best.cost - null and worthwhile(swapped, other.effect):
                 best = swapped
                 kept[number] = replace(step, effect=other.effect)
                 break
         else:
             rest = [e for e in best.effects if e != step.effect]
             without = selection.refit(rest, best.values, shift=best.shift)
-            if without.cost < best.cost + step.null_95:
+            if without.cost < best.cost + null or without.structure < floor:
                 best, kept[number] = without, replace(step, effect="")
     kept[:] = [step for step in kept if step.effect]
     found = selection.refit(best.effects, best.values)

@@ -25,6 +25,7 @@ ROUGH_SPREAD = {
     "patch_y": 2.0,
     "patch_friction": 0.5,
     "stribeck_speed": 0.7,
+    "ripple_lead": 0.2,
 }
 
 

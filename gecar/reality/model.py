@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -88,10 +89,22 @@ class Step:
     after: float = 0.0
 
 
-def worthwhile(model: Model, effect: str) -> bool:
+class Fitted(Protocol):
+    """What has fitted effects: a model, or a first try of one."""
+
+    @property
+    def freedom(self) -> Freedom:
+        """The effects' coordinates."""
+
+    @property
+    def fit(self) -> Fit:
+        """Where the fit ended."""
+
+
+def worthwhile(model: Fitted, effect: str) -> bool:
     """Whether an effect's size in a model is worth a name."""
     if effect == "dead_band":
-        found = model.values[effect]
+        found = model.freedom.values(model.fit.z)[effect]
         return found["duty_pct"] >= 1.0 and (found["offset_share"] > 0.3 or found["duty_pct"] >= HELD_DUTY)
     sizes = []
     low, high = model.freedom.bounds

@@ -22,8 +22,10 @@ Array = npt.NDArray[np.float64]
 BEGUN, REFITTED = 10, 5
 LEAST_GAIN = 0.02  # of cost, a block: less is not worth fitting
 NEIGHBOURS = 5.5  # coordinates
-# Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor.
-ROUGH = frozenset({"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction"})
+# Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor, waves.
+ROUGH = frozenset(
+    {"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction", "torque_ripple"}
+)
 ROUGH_SHARE = 0.3  # of the best effect's gain: less is not worth the search
 RESTARTS, SHORT, FINALISTS = 6, 8, 2  # places searched from, generations there, and how many are searched on
 STUCK, STUCK_SPREAD = (
@@ -61,10 +63,11 @@ def steps(fits: Fits, catalogue: Sequence[str], recordings: Sequence[Recording],
     rough.sort(key=lambda t: -t.promise)
     if not rough or rough[0].promise < LEAST_GAIN * fits.blocks.count:
         return []
-    begun = [_begin(fits, t) for t in rough[:BEGUN] if t.promise > 0.05 * rough[0].promise]
+    begun = [_begin(fits, t) for t in rough[:BEGUN]]
     begun.sort(key=lambda t: t.fit.cost)
     gains = [t.base.cost - t.fit.cost for t in begun]
-    best = max(gains)
+    # What is too small for a name may gain by imitating much; it must not shut the others out.
+    best = max((g for t, g in zip(begun, gains, strict=True) if worthwhile(t, t.effect)), default=max(gains))
     done = []
     for trial, gain in list(zip(begun, gains, strict=True))[:REFITTED]:
         if gain < 0.02 * best:

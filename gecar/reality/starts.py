@@ -26,6 +26,7 @@ Values = Mapping[str, float]
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (3.0, 12.0)  # in steps worth a name
+PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 
 
@@ -121,13 +122,17 @@ def _ripple(
         sines, sine, cosines, cosine = (w * (errors(_rippled(cycles, *p, size)) - bare) for p in pairs)
         basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
         a, b, c, d = -np.linalg.lstsq(basis, w * bare, rcond=None)[0]
-        amplitude = 0.5 * size * (math.hypot(a, b) + math.hypot(c, d))
+        most = size * max(math.hypot(a, b), math.hypot(c, d))
+        phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
         for share in (
             1.0,
             2.0,
             4.0,
-        ):  # a strong ripple runs the simulation out of step: least squares asks too little
-            yield _rippled(cycles, math.atan2(b, a), math.atan2(d, c), share * amplitude)
+        ):  # least squares asks for too little: a ripple runs out of step with the simulation
+            found, opposite = (_rippled(cycles, *pair, share * most) for pair in phases)
+            gain, other = (cost(bare) - cost(errors(values)) for values in (found, opposite))
+            if other < PHASE_COUNTS * gain:
+                yield found
 
 
 def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[str, float]:
