@@ -23,6 +23,7 @@ from gecar.reality.replay import Film
 from gecar.world.course import Course
 
 Array = npt.NDArray[np.float64]
+NO_SHIFT = np.zeros(3)
 
 CHANNELS = (
     "left_angle", "right_angle", "battery", "yaw_rate", "x", "y", "heading", "reflection",
@@ -60,7 +61,7 @@ class Strip:
             return
         self.path = measured_path(self.film, physics)
         self.path_late = float(physics["pose_delay"][0]) + self.film.offset_s
-        middle = self._readings(physics, np.zeros(3))
+        middle = self._readings(physics, NO_SHIFT)
         variance = np.full(len(middle), self.noise.reflection_sd**2)
         for shift in np.diag(self.noise.path_sd * self.path_colour):
             variance += (0.5 * (self._readings(physics, shift) - self._readings(physics, -shift))) ** 2
@@ -85,11 +86,14 @@ class Strip:
         )
         return readings
 
-    def readings(self, physics: npt.NDArray[Any]) -> Array:
-        """Return the predicted reflection at every row [%]; nan where there is nothing to compare."""
+    def readings(self, physics: npt.NDArray[Any], shift: Array = NO_SHIFT) -> Array:
+        """Return the predicted reflection at every row [%]; nan where there is nothing to compare.
+
+        A shift moves the whole path [m, m, rad], shape (3,).
+        """
         if not self.looks:
             return np.full(len(self.film.t), np.nan)
-        return self._readings(physics, np.zeros(3))
+        return self._readings(physics, shift)
 
     def errors(self, physics: npt.NDArray[Any], sight: bool) -> Array:
         """Return the residuals of motion, or of the colour sensor, shape (n,), channel by channel."""

@@ -27,6 +27,7 @@ from gecar.reality.levels import levelled
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
 from gecar.reality.noise import Noise, estimate_noise
+from gecar.reality.path_doubt import path_in_doubt
 from gecar.reality.recording import Case, Recording
 from gecar.reality.selection import Selection
 from gecar.reality.uncertainty import intervals
@@ -141,19 +142,21 @@ def discover(
     if sight and seen:
         more, others = _found(shop, sight, seen, found_robot)
         found, rivals = found + more, rivals + others
-    where = _map(shop, found_robot, motion, moved, seen)
     unexplained = moved.unexplained or bool(seen and seen.unexplained)
+    doubted = bool(seen and seen.unexplained) and path_in_doubt(shop.strips, found_robot.physics)
+    where = _map(shop, found_robot, motion, moved, seen, doubted)
+    word = _word(bool(found), unexplained)
     return Verdict(
         case=case.name,
-        verdict=_word(bool(found), unexplained),
+        verdict=word,
         effects=found,
-        located=where.places(np.random.default_rng(seed)),
+        located=where.places(np.random.default_rng(seed)) if word != "nothing" else (),
         judgement=judgement,
         residual=_left(shop, motion, moved, found_robot, unexplained, with_formula),
         next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
-        notes=_notes(shop, motion),
+        notes=_notes(shop, motion, doubted),
         evidence=Evidence(
             motion, moved, sight, seen, where, tuple(shop.strips), tuple(shop.held), shop.robot
         ),
@@ -271,15 +274,22 @@ def _found(
 
 
 def _map(
-    shop: _Workshop, found: Robot, motion: Selection, moved: Explanation, seen: Explanation | None
+    shop: _Workshop,
+    found: Robot,
+    motion: Selection,
+    moved: Explanation,
+    seen: Explanation | None,
+    doubted: bool,
 ) -> Map:
     explained = (not moved.unexplained, not (seen and seen.unexplained))
     mover = moved.taken.freedom.physics(moved.taken.fit.z)
     nothing = motion.nothing.fit.errors
-    return Map(shop.strips, nothing, motion.cells, shop.robot.physics, mover, found.physics, explained)
+    return Map(
+        shop.strips, nothing, motion.cells, shop.robot.physics, mover, found.physics, explained, doubted
+    )
 
 
-def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:
+def _notes(shop: _Workshop, motion: Selection, doubted: bool) -> tuple[str, ...]:
     notes = []
     if shop.split.by_time:
         notes.append(
@@ -288,6 +298,11 @@ def _notes(shop: _Workshop, motion: Selection) -> tuple[str, ...]:
     if motion.clocked:
         late = ", ".join(f"{1e3 * o:.0f}" for o in motion.comparison.offsets)
         notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
+    if doubted:
+        notes.append(
+            "Readings are right on even floor and wrong near lines, and neither the sensor nor the line explains it: "
+            "look at the camera's path, and how the sensor is mounted."
+        )
     measured = {name for r in shop.split.fitted for name in r.measured}
     if not {"x_m", "heading_rad"} & measured:
         notes.append("No pose was recorded: what only a camera sees was not looked for.")

@@ -23,11 +23,13 @@ SURE = 0.05
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
+FAINT = 0.02  # of the loudest channel's energy, of motion or of sight: less is not worth an entry
 PLACE_RADII_M = (0.1, 0.2, 0.3)
 SPAN_BINS = 2  # bins a span is made of
 LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
 SIGHT = 7
 GROUPS = ([0, 1], [2], [3], [4, 5, 6], [SIGHT])  # channels that one sensor measures: they are loud together
+POSE_GROUP, SIGHT_GROUP = 3, 4
 _GROUP = np.repeat(range(len(GROUPS)), [len(group) for group in GROUPS])
 
 
@@ -47,6 +49,8 @@ class Map:
         Physics record with what was found to move the robot.
     explained
         Whether motion and sight are explained: then what an effect takes away is what it did; else all there is counts.
+    doubted
+        Whether what was seen speaks against the path, not the sensor: then the pose comes first.
 
     Attributes
     ----------
@@ -69,6 +73,7 @@ class Map:
         moved: Physics,
         after: Physics,
         explained: tuple[bool, bool] = (True, True),
+        doubted: bool = False,
     ) -> None:
         self.strips = tuple(strips)
         self.bins = SPAN_BINS * max(int(s.film.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in strips)
@@ -82,7 +87,7 @@ class Map:
         self.energy = np.where(count > 0, total, 0.0)
         self.samples = count
         self.masks, self.path = regime_masks(self.strips, before, self.bins, BIN_S)
-        self._motion_explained = explained[0]
+        self._motion_explained, self._doubted = explained[0], doubted
         spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
         self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
 
@@ -106,7 +111,8 @@ class Map:
         mean = excess / np.maximum(self.samples.sum(axis=(1, 2)), 1.0)
         order = self._order()
         found = []
-        for channel in np.flatnonzero((mean > WORTH) & (excess > 0.02 * excess.max())):
+        most = np.where(np.arange(len(CHANNELS)) < SIGHT, excess[:SIGHT].max(), excess[SIGHT])
+        for channel in np.flatnonzero((mean > WORTH) & (excess > FAINT * most)):
             entries = [self._judge(int(channel), name, mask, rng) for name, mask in self.masks.items()]
             entries.append(self._spot(int(channel), rng))
             group = order.index(_GROUP[channel])
@@ -123,8 +129,10 @@ class Map:
         Where motion itself is not explained, nor is the path to be trusted: what was seen along it comes last.
         """
         loud = self.loud.sum(axis=(1, 2))
-        if not self._motion_explained:
-            loud[-1] = loud.min() - 1.0
+        if self._doubted or not self._motion_explained:
+            loud[SIGHT_GROUP] = loud.min() - 1.0
+        if self._doubted:
+            loud[POSE_GROUP] = loud.max() + 1.0
         if (loud <= 0.0).all():
             loud = np.array([self.energy[group].sum() for group in GROUPS])
         there = [k for k, group in enumerate(GROUPS) if self.samples[group].any()]

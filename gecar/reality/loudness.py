@@ -37,7 +37,7 @@ def loudness(
         The recording; its path is set where its colour sensor looks.
     before, moved, after
         Physics records, shape (1,): of the robot as it was known, with what was found to move it, and with all that
-        was found. Sight follows the measured path, which the second takes as well as the last.
+        was found. Motion is compared under the first and the last, sight, whose path the last two share, under these.
     bins, bin_s
         How many bins, and their length [s].
     """
