@@ -265,6 +265,16 @@ def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
     assert verdict.judgement.gap_closed > 0.9
 
 
+@pytest.mark.skipif(
+    not (SHARED / "real").is_dir(), reason="the real recordings (../shared/recordings) are not here"
+)
+def test_a_real_motor_is_predicted_within_a_hundredth() -> None:
+    held = ["step_+040", "step_-020", "step_-100"]
+    angle = discover(read_case(SHARED / "real" / "ev3_motor_a"), held).judgement.channels["left_angle_deg"]
+    assert angle.before > 0.5
+    assert angle.after < 0.009
+
+
 def test_a_verdict_prints_and_plots_itself() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     assert "commands act late" in str(verdict)

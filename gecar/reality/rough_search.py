@@ -25,6 +25,7 @@ def rough_search(
     bounds: tuple[Array, Array],
     rng: np.random.Generator,
     generations: int = 22,
+    wider: int = 1,
 ) -> tuple[Array, float]:
     """Return the best vector met, and its cost.
 
@@ -39,10 +40,12 @@ def rough_search(
     rng
         Source of chance.
     generations
-        Of 4 + 3 ln(k) + 3 trials each.
+        Of 7 + 3 ln(k) trials each.
+    wider
+        Times so many trials, where there are many valleys.
     """
     k = len(start)
-    trials = 7 + int(3 * math.log(k)) if k > 1 else 6
+    trials = wider * (7 + int(3 * math.log(k)) if k > 1 else 6)
     parents = trials // 2
     weight = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
     weight /= weight.sum()

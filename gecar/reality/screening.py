@@ -21,13 +21,14 @@ Array = npt.NDArray[np.float64]
 
 BEGUN, REFITTED = 10, 5
 LEAST_GAIN = 0.02  # of cost, a block: less is not worth fitting
-NEIGHBOURS = 5.5  # coordinates
+NEIGHBOURS, NEAR = 5.5, 1.5  # coordinates; a patch has many valleys close together
 # Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor, waves.
 ROUGH = frozenset(
     {"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction", "torque_ripple"}
 )
 ROUGH_SHARE = 0.3  # of the best effect's gain: less is not worth the search
 RESTARTS, SHORT, FINALISTS = 6, 8, 2  # places searched from, generations there, and how many are searched on
+MANY_VALLEYS = {"slippery_patch": (40, 3)}  # generations then, and how much wider the search is
 STUCK, STUCK_SPREAD = (
     1.5,
     1.5,
@@ -99,7 +100,8 @@ def _screen(fits: Fits, recordings: Sequence[Recording], model: Model, effect: s
         return None
     found = np.array([cost(residual(z)) for z in places])
     order = np.argsort(found)
-    kept = _apart([places[k] for k in order], RESTARTS)
+    apart = NEAR if effect == "slippery_patch" else NEIGHBOURS
+    kept = _apart([places[k] for k in order], RESTARTS, apart)
     slopes = fits.felt(model, effect)
     linear = _linear_gain(fits, model, slopes)
     promise = max(linear, model.cost - float(found[order[0]]))
@@ -146,7 +148,8 @@ def _search(fits: Fits, trial: _Trial) -> Model:
     short.sort(key=lambda pair: pair[1])
     best, least = trial.fit.z, trial.fit.cost
     for place, _ in short[:FINALISTS]:
-        tail, found = rough_search(cost_of, place, 0.6 * spread, bounds, fits.rng)
+        longer = MANY_VALLEYS.get(trial.effect, ())
+        tail, found = rough_search(cost_of, place, 0.6 * spread, bounds, fits.rng, *longer)
         if found < least:
             best, least = np.r_[model.fit.z, tail], found
     return fits.polished(fits.refit(trial.effects, freedom.values(best), shift=model.shift))
@@ -168,10 +171,10 @@ def _step(fits: Fits, effect: str, base: Model, found: Model) -> Step:
     return Step(effect, base, found, base.cost - found.cost, worthwhile=size, before=before, after=after)
 
 
-def _apart(places: Sequence[Array], count: int) -> tuple[Array, ...]:
+def _apart(places: Sequence[Array], count: int, distance: float) -> tuple[Array, ...]:
     """Return the first few places that are no neighbours of each other."""
     kept: list[Array] = []
     for place in places:
-        if len(kept) < count and all(np.max(np.abs(place - other)) > NEIGHBOURS for other in kept):
+        if len(kept) < count and all(np.max(np.abs(place - other)) > distance for other in kept):
             kept.append(place)
     return tuple(kept)
