@@ -15,14 +15,24 @@ from gecar.reality.model import Model, Step
 Array = npt.NDArray[np.float64]
 
 NULLS = 500
+SLOPELESS = frozenset({"slippery_patch"})  # no Newton step tells what it would be without a recording
+ALONE = 0.9  # of a step's gain in one recording
+LEFT = 0.02  # of the structure: what a whole explanation leaves
 TOLD = 0.02  # of what all recordings tell of a parameter
 
 
 def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
     """Judge a step by leaving out recordings, and against the null."""
-    new = step.model
-    several = len(np.unique(fits.blocks.folds)) > 1
-    gains = _gains(fits, step.base, new) if several else np.array([step.gain])
+    new, folds = step.model, fits.blocks.folds
+    saved = np.bincount(folds, costs(step.base.fit.errors) - costs(new.fit.errors))
+    if len(np.unique(folds)) < 2 or (saved.max() > ALONE * step.gain and step.after < LEFT * step.before):
+        gains = np.array(
+            [step.gain]
+        )  # seen in one recording alone, but wholly explained: an imitation leaves something
+    elif step.effect in SLOPELESS:
+        gains = np.where(saved.sum() - saved > TOLD * saved.sum(), saved, np.minimum(saved, 0.0))
+    else:
+        gains = _gains(fits, step.base, new)
     nulls = null(fits, catalogue, new)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)

@@ -10,6 +10,7 @@ from gecar.reality.levels import level_spans
 from gecar.reality.model import Model
 from gecar.reality.selection import Selection
 from gecar.reality.verdict import Interval
+from gecar.reality.wandering import wandered
 
 Array = npt.NDArray[np.float64]
 
@@ -55,6 +56,8 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
     out: dict[str, dict[str, Interval]] = {}
     low, high = model.freedom.bounds
     spans = level_spans(selection, model)
+    for k, (left, right) in wandered(selection, model).items():
+        spans[k] = (max(float(model.fit.z[k]) - left, 0.0), max(right - float(model.fit.z[k]), 0.0))
     for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
         z = float(model.fit.z[k])
         step = MORE_STEP.get(c.parameter.field, SYSTEMATIC_STEP) if c.parameter.worthwhile > 0.0 else 0.0

@@ -163,7 +163,7 @@ METHODS: dict[str, tuple[tuple[Any, str, object], ...]] = {
 }
 # What the scorer does not read costs time.
 _UNREAD: tuple[tuple[Any, str, Callable[..., object]], ...] = (
-    (discovery, "describe", lambda *_: None),
+    (discovery, "describe", lambda *_: ()),
     (discovery, "suggest", lambda *_: NextRecording("", ())),
 )
 
