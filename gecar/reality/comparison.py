@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.looking import look_along
-from gecar.reality.noise import Noise
+from gecar.reality.noise import PATH_CAUTION, Noise
 from gecar.reality.path import measured_path
 from gecar.reality.recording import Recording
 from gecar.reality.replay import Film
@@ -24,6 +24,8 @@ from gecar.world.course import Course
 
 Array = npt.NDArray[np.float64]
 NO_SHIFT = np.zeros(3)
+SMOOTHED_BLOCKS = 2.8  # blocks a path is smoothed over: 3.5 x 0.12 s of 0.15 s each
+DISC_SPREAD = 4.0  # a disc's diameter over its standard deviation along an axis
 
 CHANNELS = (
     "left_angle", "right_angle", "battery", "yaw_rate", "x", "y", "heading", "reflection",
@@ -52,7 +54,7 @@ class Strip:
         self.raster = course.raster(course.pitch_m) if course is not None and self.looks else None
         self.pitch = course.pitch_m if course is not None else 1.0
         self.path, self.path_late = np.zeros((0, 3)), 0.0
-        self.path_colour = np.ones(3)
+        self.path_colour, self.blur_m = np.ones(3), 0.0
         self.reading_sd = np.full(len(seen), np.nan)
 
     def set_path(self, physics: npt.NDArray[Any]) -> None:
@@ -61,6 +63,11 @@ class Strip:
             return
         self.path = measured_path(self.film, physics)
         self.path_late = float(physics["pose_delay"][0]) + self.film.offset_s
+        # What an uncertain path crosses is smeared: on the mean a spot that is larger by as much sees the same. Noise
+        # that lingers is not smoothed away: over a block it stays, over the smoothing's blocks it adds up.
+        lingering = 1.0 + SMOOTHED_BLOCKS * (self.path_colour**2 - 1.0)
+        sd = self.noise.path_sd / PATH_CAUTION * np.sqrt(lingering)
+        self.blur_m = float(np.hypot(sd[0], float(physics["sensor_ahead"][0]) * sd[2]))
         middle = self._readings(physics, NO_SHIFT)
         variance = np.full(len(middle), self.noise.reflection_sd**2)
         for shift in np.diag(self.noise.path_sd * self.path_colour):
@@ -73,6 +80,8 @@ class Strip:
         # The path is kept on the camera's clock as the model had it; a later camera means an earlier robot.
         late = float(physics["pose_delay"][0]) + self.film.offset_s - self.path_late
         assert self.raster is not None
+        physics = physics.copy()
+        physics["spot_diameter"] = np.hypot(physics["spot_diameter"], DISC_SPREAD * self.blur_m)
         look_along(
             self.film.t,
             self.path,
