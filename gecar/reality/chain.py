@@ -38,7 +38,7 @@ class Limits:
 # Measured on robots in a 3D engine with nothing concealed: motion 0.2 to 0.6; sight up to 8, for a path's errors
 # linger while the sensor crosses an edge.
 MOTION = Limits(floor=0.7, least_drop=0.1, unexplained=2.5)
-SIGHT = Limits(floor=6.0, least_drop=1.5, unexplained=25.0)
+SIGHT = Limits(floor=6.0, least_drop=0.8, unexplained=25.0)
 NEARLY = 0.8  # of the best effect's gain: clocks that gain this come first
 MORE_THAN_COMMON = 1.3  # times the gain of one delay common to all: what clocks must gain
 MAIN_SHARE = 0.35  # of what is left: what an effect explains that is no stand-in
