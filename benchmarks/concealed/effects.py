@@ -228,7 +228,7 @@ EFFECTS: dict[str, Effect] = {
     "spot_size": Effect(
         _added("spot_diameter", "diameter_m", "m", 0.003, 0.02, neutral=0.008), "sensor time", _LIGHT
     ),
-    "line_shift": Effect(_line_shift, "sensor place", _LIGHT),
+    "line_shift": Effect(_line_shift, "sensor place", (*_LIGHT, *_POSE)),
     "clock_skew": Effect(_added("clock_skew", "rate", "-", 0.004, 0.05, positive=0.5), "top speed"),
     "pose_delay": Effect(_added("pose_delay", "time_s", "s", 0.008, 0.15), "pose time", _POSE),
 }

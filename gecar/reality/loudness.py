@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from gecar.reality.blocks import CHI_SQUARE_MEDIAN, MOST_COLOUR
 from gecar.reality.comparison import CHANNELS, Strip
+from gecar.reality.noise import PATH_CAUTION
 from gecar.reality.replay import Film
 
 Array = npt.NDArray[np.float64]
@@ -133,7 +134,7 @@ def _add_sight(strip: Strip, before: Physics, after: Physics, out: Array, bin_s:
     seen = ~np.isnan(read)
     at = np.minimum((strip.film.t[seen] / bin_s).astype(int), out.shape[2] - 1)
     sd = strip.noise.reflection_sd
-    surplus = (strip.reading_sd[seen] / sd) ** 2 - 1.0
+    surplus = ((strip.reading_sd[seen] / sd) ** 2 - 1.0) / PATH_CAUTION**2
     for k, physics in enumerate((before, after)):
         errors = (read[seen] - strip.readings(physics)[seen]) / sd
         np.add.at(out[k, 7], at, errors**2 - surplus)
