@@ -21,18 +21,36 @@ Array = npt.NDArray[np.float64]
 
 BEGUN, REFITTED = 10, 5
 LEAST_GAIN = 0.02  # of cost, a block: less is not worth fitting
-NEIGHBOURS, NEAR = 5.5, 1.5  # coordinates; a patch has many valleys close together
 # Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor, waves.
 ROUGH = frozenset(
     {"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction", "torque_ripple"}
 )
 ROUGH_SHARE = 0.3  # of the best effect's gain: less is not worth the search
-RESTARTS, SHORT, FINALISTS = 6, 8, 2  # places searched from, generations there, and how many are searched on
-MANY_VALLEYS = {"slippery_patch": (40, 3)}  # generations then, and how much wider the search is
+SHORT = 8  # generations of a first search
 STUCK, STUCK_SPREAD = (
     1.5,
     1.5,
 )  # structure a block that makes a fit doubtful; how far about it is then searched
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """How rough ground is searched.
+
+    ``apart``: how far places begun from are from each other [coordinates]; ``restarts``: how many they are at most;
+    ``finalists``: how many of them are searched on, for ``generations`` of ``wider`` times as many trials.
+    """
+
+    apart: float = 5.5
+    restarts: int = 6
+    finalists: int = 2
+    generations: int = 22
+    wider: int = 1
+
+
+USUAL = _Ground()
+# A patch's edge makes many valleys close together; with fewer finalists three seeds ended in three places.
+GROUNDS = {"slippery_patch": _Ground(1.5, 12, 6, 40, 3)}
 
 
 @dataclass(frozen=True)
@@ -100,8 +118,8 @@ def _screen(fits: Fits, recordings: Sequence[Recording], model: Model, effect: s
         return None
     found = np.array([cost(residual(z)) for z in places])
     order = np.argsort(found)
-    apart = NEAR if effect == "slippery_patch" else NEIGHBOURS
-    kept = _apart([places[k] for k in order], RESTARTS, apart)
+    ground = GROUNDS.get(effect, USUAL)
+    kept = _apart([places[k] for k in order], ground.restarts, ground.apart)
     slopes = fits.felt(model, effect)
     linear = _linear_gain(fits, model, slopes)
     promise = max(linear, model.cost - float(found[order[0]]))
@@ -147,9 +165,11 @@ def _search(fits: Fits, trial: _Trial) -> Model:
     ]
     short.sort(key=lambda pair: pair[1])
     best, least = trial.fit.z, trial.fit.cost
-    for place, _ in short[:FINALISTS]:
-        longer = MANY_VALLEYS.get(trial.effect, ())
-        tail, found = rough_search(cost_of, place, 0.6 * spread, bounds, fits.rng, *longer)
+    ground = GROUNDS.get(trial.effect, USUAL)
+    for place, _ in short[: ground.finalists]:
+        tail, found = rough_search(
+            cost_of, place, 0.6 * spread, bounds, fits.rng, ground.generations, ground.wider
+        )
         if found < least:
             best, least = np.r_[model.fit.z, tail], found
     return fits.polished(fits.refit(trial.effects, freedom.values(best), shift=model.shift))
