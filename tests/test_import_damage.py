@@ -40,6 +40,11 @@ def test_cut_last_line_is_left_out(bring_in, run):
     assert "file0.txt: left out line 1201: not 7 fields" in imported.repairs
 
 
+def test_a_log_with_commands_in_its_last_row_alone_is_refused(bring_in):
+    with pytest.raises(InputError, match="found 1 rows from the first command on, expected at least two"):
+        bring_in("Time,duty,angle\n0,,1\n10,,1\n20,5,2\n")
+
+
 def test_repeated_and_misplaced_times_are_left_out(bring_in, run):
     text = with_line(brick_log(run), 100, lambda line: "3.5" + line[line.index(",") :])
     text = with_line(text, 200, lambda line: line + "\n" + line)

@@ -96,6 +96,8 @@ def import_logs(paths: Sequence[Path], robot: Robot, setup: Setup, options: Impo
     joining = join(brick, camera, robot, options.frame, options.offset_s)
     repairs = [line for log in logs for line in log.repairs] + joining.lines
     columns = _with_commands(joining.columns, options.constant, repairs)
+    if len(columns["t_s"]) < 2:
+        raise expected(paths[0], f"{len(columns['t_s'])} rows from the first command on", "at least two")
     recording = make_recording(str(paths[0]), columns, _with_notes(setup, logs))
     return Imported(
         recording, tuple(line for log in logs for line in log.guesses), tuple(repairs), joining.offset
