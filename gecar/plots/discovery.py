@@ -28,7 +28,7 @@ from gecar.plots.style import (
     new_figure,
 )
 from gecar.reality.comparison import CHANNELS, Strip
-from gecar.reality.discovery import Evidence
+from gecar.reality.evidence import Evidence
 from gecar.reality.loudness import STRETCH_S, stretch_errors
 from gecar.reality.verdict import Place, Verdict
 from gecar.world.course import load_course

@@ -19,6 +19,7 @@ from gecar.reality.chain import Explanation, explain
 from gecar.reality.comparison import Comparison, Strip
 from gecar.reality.confusion import alternatives
 from gecar.reality.described import with_formulas
+from gecar.reality.evidence import Evidence
 from gecar.reality.fitting import cost
 from gecar.reality.formula import Formula, describe
 from gecar.reality.holdout import Misfit, Split, judge, split
@@ -41,36 +42,6 @@ Array = npt.NDArray[np.float64]
 
 MEMORY_S = 1.0
 POSES = (4, 5, 6)  # channels of the pose
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What a verdict rests on: selections and explanations of motion and of sight, for pictures and for the curious."""
-
-    motion: Selection
-    moved: Explanation
-    sight: Selection | None
-    seen: Explanation | None
-    where: Map
-    strips: tuple[Strip, ...]
-    held: tuple[Strip, ...]
-    before: Robot
-
-    def __str__(self) -> str:
-        words = [_told("motion", self.motion, self.moved)]
-        if self.sight is not None and self.seen is not None:
-            words.append(_told("sight", self.sight, self.seen))
-        return "; ".join(words)
-
-
-def _told(name: str, selection: Selection, explained: Explanation) -> str:
-    blocks = max(selection.blocks.count, 1)
-    tried = [
-        f"{s.effect}{'' if s.worthwhile else '-'} {s.gain:.0f}/{s.model.structure / blocks:.2f}"
-        for s in (explained.tried[-1][:3] if explained.tried else ())
-    ]
-    before, after = selection.nothing.structure / blocks, explained.taken.structure / blocks
-    return f"{name} {before:.2f} -> {after:.2f} last tried: {', '.join(tried)}"
 
 
 @dataclass

@@ -25,10 +25,10 @@ def judged(fits: Fits, catalogue: Sequence[str], step: Step) -> Step:
     """Judge a step by leaving out recordings, and against the null."""
     new, folds = step.model, fits.blocks.folds
     saved = np.bincount(folds, costs(step.base.fit.errors) - costs(new.fit.errors))
-    if len(np.unique(folds)) < 2 or (saved.max() > ALONE * step.gain and step.after < LEFT * step.before):
-        gains = np.array(
-            [step.gain]
-        )  # seen in one recording alone, but wholly explained: an imitation leaves something
+    # What one recording alone shows can not be left out. Wholly explained it counts: an imitation leaves something.
+    alone = saved.max() > ALONE * step.gain and step.after < LEFT * step.before
+    if alone or len(np.unique(folds)) < 2:
+        gains = np.array([step.gain])
     elif step.effect in SLOPELESS:
         gains = np.where(saved.sum() - saved > TOLD * saved.sum(), saved, np.minimum(saved, 0.0))
     else:

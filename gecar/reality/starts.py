@@ -124,11 +124,8 @@ def _ripple(
         a, b, c, d = -np.linalg.lstsq(basis, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
         phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
-        for share in (
-            1.0,
-            2.0,
-            4.0,
-        ):  # least squares asks for too little: a ripple runs out of step with the simulation
+        # Least squares asks for too little: a ripple runs out of step with the simulation.
+        for share in (1.0, 2.0, 4.0):
             found, opposite = (_rippled(cycles, *pair, share * most) for pair in phases)
             gain, other = (cost(bare) - cost(errors(values)) for values in (found, opposite))
             if other < PHASE_COUNTS * gain:
@@ -149,10 +146,8 @@ def _turned(recording: Recording, robot: Robot) -> float:
     """Return how far a shaft has turned at least [revolutions], by its angles or else by the path."""
     angles = np.ptp(_known(recording), axis=0).max()
     path = np.column_stack([recording.x_m, recording.y_m])
-    driven = np.hypot(*np.diff(path[~np.isnan(path).any(axis=1)], axis=0).T).sum() / float(
-        robot.physics["wheel_radius"][0]
-    )
-    return float(angles or driven) / math.tau
+    driven = np.hypot(*np.diff(path[~np.isnan(path).any(axis=1)], axis=0).T).sum()
+    return float(angles or driven / robot.physics["wheel_radius"][0]) / math.tau
 
 
 def _known(recording: Recording) -> Array:
