@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -149,7 +150,10 @@ def read_image(path: Path, where: str) -> npt.NDArray[np.uint8]:
         If it is missing, no picture, or has more pixels than a raster may have cells.
     """
     try:
-        with Image.open(path) as picture:
+        with warnings.catch_warnings():  # the check below says it in one line
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            picture = Image.open(path)
+        with picture:
             _check_picture(picture, where)
             sheet = Image.new("RGBA", picture.size, "white")
             sheet.alpha_composite(picture.convert("RGBA"))
