@@ -82,9 +82,13 @@ class Fits:
         z, least = rough_search(lambda at: cost(residual(at)), model.fit.z, wide, freedom.bounds, self.rng)
         if least >= model.cost:
             return model
-        errors = residual(z)
+        return self.moved(model, z)
+
+    def moved(self, model: Model, z: Array) -> Model:
+        """Return a model at other coordinates, with the slopes it had."""
+        errors = self.residual(model.freedom, model.shift)(z)
         found = Fit(z, errors, model.fit.jacobian, cost(errors))
-        return Model(model.effects, freedom, found, self.blocks.structure(errors), model.shift)
+        return Model(model.effects, model.freedom, found, self.blocks.structure(errors), model.shift)
 
     def slopes(self, model: Model) -> Array:
         """Return how residuals feel a model's own parameters, shape (n, parameters)."""

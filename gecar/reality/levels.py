@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting import Fit, cost, fit
+from gecar.reality.fitting import cost, fit
 from gecar.reality.model import Model
 from gecar.reality.selection import Selection
 
@@ -33,10 +33,7 @@ def levelled(selection: Selection, model: Model) -> Model:
     own = _own(model)
     if not len(own):
         return model
-    z, _ = _fitted(_weighed(selection, model), model, own)
-    errors = selection.residual(model.freedom, model.shift)(z)
-    found = Fit(z, errors, model.fit.jacobian, cost(errors))
-    return Model(model.effects, model.freedom, found, selection.blocks.structure(errors), model.shift)
+    return selection.moved(model, _fitted(_weighed(selection, model), model, own)[0])
 
 
 def level_spans(selection: Selection, model: Model) -> dict[int, tuple[float, float]]:

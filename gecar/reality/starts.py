@@ -87,12 +87,6 @@ def _top_speed(recording: Recording) -> float:
     return float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None], initial=0.0))
 
 
-def _torque_scale(robot: Robot) -> float:
-    """Return how much stronger the robot's motors are than an EV3's, by stall torque."""
-    m = robot.motor
-    return m.torque_constant * robot.battery.voltage / m.resistance / 0.433
-
-
 def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
     for duty in (2.0, 5.0, 10.0, 15.0, 20.0):
         yield {"duty_pct": duty, "offset_share": 1.0}
@@ -114,7 +108,7 @@ def _ripple(
     turned = max(_turned(r, robot) for r in recordings)
     size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
     bare = errors(_rippled(1, 0.0, 0.0, 0.0))
-    w = np.sqrt(weights(bare))
+    w, least = np.sqrt(weights(bare)), cost(bare)
     for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
         if cycles * turned < LEAST_CYCLES:
             continue
@@ -127,7 +121,7 @@ def _ripple(
         # Least squares asks for too little: a ripple runs out of step with the simulation.
         for share in (1.0, 2.0, 4.0):
             found, opposite = (_rippled(cycles, *pair, share * most) for pair in phases)
-            gain, other = (cost(bare) - cost(errors(values)) for values in (found, opposite))
+            gain, other = (least - cost(errors(values)) for values in (found, opposite))
             if other < PHASE_COUNTS * gain:
                 yield found
 
