@@ -22,7 +22,6 @@ from gecar import reality
 from gecar.errors import InputError
 from gecar.plots.discovery import verdict_figures
 from gecar.plots.style import picture
-from gecar.reality.comparison import Strip
 from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
 from gecar.reality.formula import NAMES, Formula, describe
@@ -34,6 +33,7 @@ from gecar.reality.replay import Film
 from gecar.reality.rough_search import rough_search
 from gecar.reality.setup import Setup
 from gecar.reality.starts import starts
+from gecar.reality.strip import Strip
 from gecar.reality.verdict import Judgement, Residual, Verdict
 from gecar.reality.whiteness import whiteness
 from gecar.report.verdict import sentences

@@ -27,9 +27,9 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
-from gecar.reality.comparison import CHANNELS, Strip
 from gecar.reality.evidence import Evidence
 from gecar.reality.loudness import STRETCH_S, stretch_errors
+from gecar.reality.strip import CHANNELS, Strip
 from gecar.reality.verdict import Place, Verdict
 from gecar.world.course import load_course
 

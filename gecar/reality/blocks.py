@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.comparison import CHANNELS, Cells
+from gecar.reality.strip import CHANNELS, Cells
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +30,8 @@ class Blocks:
         Number of blocks.
     samples
         Samples in each, shape (count,).
+    recording, t_s
+        Where each lies, and its middle [s], shape (count,).
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -40,6 +42,9 @@ class Blocks:
         self.samples = np.bincount(self._of, minlength=self.count)
         self._channel = np.zeros(self.count, np.int64)
         self._channel[self._of] = cells.channel
+        self.recording = np.zeros(self.count, np.int64)
+        self.recording[self._of] = cells.recording
+        self.t_s = np.bincount(self._of, cells.t_s, self.count) / np.maximum(self.samples, 1)
 
     def structure(self, errors: Array, colour: Array | None = None) -> float:
         """Return the energy short averages keep, above what noise of a colour would leave.
@@ -51,11 +56,15 @@ class Blocks:
         colour
             As `colour` returns it; default: that of these residuals.
         """
-        return self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), colour)
+        return float(np.sum(self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), colour)))
+
+    def excess(self, errors: Array) -> Array:
+        """Return each block's structure, in variances of its mean, shape (blocks,); 0 on average for noise."""
+        return self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), None)
 
     def structure_of_sums(self, sums: Array) -> float:
         """Return the structure of residuals of which only each block's sum is known, shape (blocks,)."""
-        return self._above(self._energy(sums), None)
+        return float(np.sum(self._above(self._energy(sums), None)))
 
     def sums(self, values: Array) -> Array:
         """Return each block's sum of values, shape (blocks,)."""
@@ -70,9 +79,10 @@ class Blocks:
         """
         return self._colour(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))))
 
-    def _above(self, energy: Array, colour: Array | None) -> float:
+    def _above(self, energy: Array, colour: Array | None) -> Array:
         expected = (self._colour(energy) if colour is None else colour)[self._channel]
-        return float(np.sum(energy / expected - 1.0))
+        above: Array = energy / expected - 1.0
+        return above
 
     def _colour(self, energy: Array) -> Array:
         out = np.ones(len(CHANNELS))

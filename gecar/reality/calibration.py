@@ -26,13 +26,14 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from gecar.reality.camera import corrected
-from gecar.reality.comparison import Comparison, Strip
+from gecar.reality.comparison import Comparison
 from gecar.reality.constant_fit import fitted
 from gecar.reality.constants import MARK, Constant, Slack, chosen, with_constants
 from gecar.reality.holdout import Misfit, Split, judge, split
 from gecar.reality.identifiable import BLIND, at_bounds, sensitivities, told_apart
 from gecar.reality.noise import Noise, estimate_noise
 from gecar.reality.recording import Case, Recording
+from gecar.reality.strip import Strip
 from gecar.world.course import Course, load_course
 from gecar.world.robot import Robot, load_robot
 

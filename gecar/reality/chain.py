@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from gecar.reality.model import Model, Step, worthwhile
 from gecar.reality.screening import ROUGH
 from gecar.reality.selection import Selection
+from gecar.reality.standing_out import stands_out
 
 MOST_EFFECTS = 4
 MOST_ON_BENCH = 7  # a motor alone is known to tenths of a percent, and shows all its parts
@@ -16,29 +17,6 @@ NEARLY_STOOD = 0.75  # of the structure: a chain that explains so much is worth 
 SWAPPED = 4  # of each stage's runners-up are tried in the place of what was taken
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What structure counts for something, a block of samples; noise alone leaves 0 on average.
-
-    Attributes
-    ----------
-    floor
-        What the simulation itself leaves where nothing is missing.
-    least_drop
-        What an effect must explain at least.
-    unexplained
-        What may be left without a word.
-    """
-
-    floor: float
-    least_drop: float
-    unexplained: float
-
-
-# Measured on robots in a 3D engine with nothing concealed: motion 0.2 to 0.6; sight up to 8, for a path's errors
-# linger while the sensor crosses an edge; of 81 none lost a third of that to an effect worth a name.
-MOTION = Limits(floor=0.7, least_drop=0.1, unexplained=2.5)
-SIGHT = Limits(floor=6.0, least_drop=0.8, unexplained=25.0)
 NEARLY = 0.8  # of the best effect's gain: clocks that gain this come first
 MORE_THAN_COMMON = 1.3  # times the gain of one delay common to all: what clocks must gain
 MAIN_SHARE = 0.35  # of what is left: what an effect explains that is no stand-in
@@ -96,12 +74,13 @@ def explain(selection: Selection) -> Explanation:
     kept = list(best.steps)
     tried = [tuple(first), *best.tried[1:]]
     taken = _settled(selection, kept, tried)
-    left = selection.rid_of_subtle(taken).structure
+    left = selection.rid_of_subtle(taken)
     floor = max(
-        _limits(selection).unexplained * selection.blocks.count,
+        selection.limits.unexplained * selection.blocks.count,
         UNEXPLAINED_SHARE * selection.nothing.structure,
     )
-    return Explanation(taken, tuple(kept), tuple(tried), left > floor)
+    unexplained = left.structure > floor or (not kept and stands_out(selection, left))
+    return Explanation(taken, tuple(kept), tuple(tried), unexplained)
 
 
 @dataclass(frozen=True)
@@ -116,7 +95,7 @@ class _Way:
 
 def _best_way(selection: Selection, ways: list[_Way]) -> _Way:
     """Return the way with the fewest effects, unless a longer one explains a good part of what that leaves."""
-    floor = _limits(selection).floor * selection.blocks.count
+    floor = selection.limits.floor * selection.blocks.count
     ways = sorted(ways, key=lambda way: (len(way.steps), way.model.cost))
     best = ways[0]
     for way in ways[1:]:
@@ -158,7 +137,7 @@ def _on_bench(selection: Selection) -> bool:
 
 
 def _worth_a_look(selection: Selection, model: Model) -> bool:
-    return model.structure > _limits(selection).least_drop * selection.blocks.count
+    return model.structure > selection.limits.least_drop * selection.blocks.count
 
 
 def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...]]) -> Model:
@@ -170,7 +149,7 @@ def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...
     if not kept:
         return selection.nothing
     best, null = kept[-1].model, kept[-1].null_95  # of what is left at the end; earlier ones are of what was
-    floor = _limits(selection).floor * selection.blocks.count
+    floor = selection.limits.floor * selection.blocks.count
     rivals = {step.effect: step for stage in tried for step in stage[:SWAPPED]}
     for number, step in enumerate(list(kept)):
         if len(kept) < 2:
@@ -201,7 +180,7 @@ def _best(selection: Selection, done: list[Step]) -> Step | None:
         drop = step.before - step.after
         if (
             not all(worthwhile(step.model, effect) for effect in step.model.effects)
-            or drop < _limits(selection).least_drop * selection.blocks.count
+            or drop < selection.limits.least_drop * selection.blocks.count
             or step.gain < 0.3 * done[0].gain
         ):
             continue
@@ -219,7 +198,7 @@ def _kept(selection: Selection, steps: list[Step]) -> int:
     """
     if not steps:
         return 0
-    limits = _limits(selection)
+    limits = selection.limits
     first = steps[0].before
     excess = max(first - limits.floor * selection.blocks.count, limits.least_drop * selection.blocks.count)
     kept, whole_before = 0, False
@@ -234,7 +213,3 @@ def _kept(selection: Selection, steps: list[Step]) -> int:
             kept = number
         whole_before = whole_before or whole
     return kept
-
-
-def _limits(selection: Selection) -> Limits:
-    return SIGHT if selection.comparison.sight else MOTION

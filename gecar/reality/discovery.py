@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from gecar.reality.alignment import fitted_offsets
 from gecar.reality.chain import Explanation, explain
-from gecar.reality.comparison import Comparison, Strip
+from gecar.reality.comparison import Comparison
 from gecar.reality.confusion import alternatives
 from gecar.reality.described import with_formulas
 from gecar.reality.evidence import Evidence
@@ -25,15 +25,18 @@ from gecar.reality.formula import Formula, describe
 from gecar.reality.holdout import Misfit, Split, judge, split
 from gecar.reality.known_robot import known_robot
 from gecar.reality.levels import levelled
+from gecar.reality.limits import SIGHT, SIGHT_ON_A_DOUBTFUL_PATH
 from gecar.reality.location import Map
 from gecar.reality.next_recording import suggest
 from gecar.reality.noise import Noise, estimate_noise
 from gecar.reality.path_doubt import path_in_doubt
 from gecar.reality.recording import Case, Recording
+from gecar.reality.remarks import remarks
 from gecar.reality.selection import Selection
+from gecar.reality.strip import Strip
 from gecar.reality.uncertainty import intervals
 from gecar.reality.verdict import Found, Judgement, Residual, Verdict
-from gecar.reality.visible import SIGHT, visible
+from gecar.reality.visible import visible, visible_to_sight
 from gecar.reality.whiteness import whiteness
 from gecar.world.course import Course, load_course
 from gecar.world.robot import Robot
@@ -127,7 +130,7 @@ def discover(
         next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
         robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
         fitted_on=tuple(r.name for r in shop.split.fitted),
-        notes=_notes(shop, motion, doubted),
+        notes=remarks(shop.split, shop.strips, motion, doubted),
         evidence=Evidence(
             motion, moved, sight, seen, where, tuple(shop.strips), tuple(shop.held), shop.robot
         ),
@@ -175,19 +178,30 @@ def _open(
 
 def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection | None, Explanation | None]:
     """Explain what the colour sensor saw along the measured path."""
+    mover = moved.taken.freedom.physics(moved.taken.fit.z)
+    list(shop.pool.map(lambda strip: strip.locate(mover), shop.strips))
     comparison = Comparison(shop.strips, True, shop.pool)
     if not comparison.strips:
         return None, None
-    comparison.set_path(moved.taken.freedom.physics(moved.taken.fit.z), colour)
+    comparison.set_path(mover, colour)
     known = shop.robot.with_effects(
         moved.taken.values
     )  # a late camera, a skewed clock shift what is seen, too
-    selection = Selection(comparison, known, SIGHT, shop.split.fitted, shop.seed, shop.tell)
+    selection = Selection(
+        comparison,
+        known,
+        visible_to_sight(comparison.strips),
+        shop.split.fitted,
+        shop.seed,
+        shop.tell,
+        SIGHT_ON_A_DOUBTFUL_PATH if moved.unexplained else SIGHT,
+    )
     seen = explain(selection)
     return selection, replace(seen, taken=levelled(selection, seen.taken))
 
 
 def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
+    list(shop.pool.map(lambda strip: strip.locate(found.physics), shop.held))
     sight = Comparison(shop.held, True, shop.pool)
     sight.set_path(found.physics, colour)
     channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
@@ -258,23 +272,3 @@ def _map(
     return Map(
         shop.strips, nothing, motion.cells, shop.robot.physics, mover, found.physics, explained, doubted
     )
-
-
-def _notes(shop: _Workshop, motion: Selection, doubted: bool) -> tuple[str, ...]:
-    notes = []
-    if shop.split.by_time:
-        notes.append(
-            "Only one recording: its last part was set aside, so the proof is by time, not by another run."
-        )
-    if motion.clocked:
-        late = ", ".join(f"{1e3 * o:.0f}" for o in motion.comparison.offsets)
-        notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
-    if doubted:
-        notes.append(
-            "Readings are right on even floor and wrong near lines, and neither the sensor nor the line explains it: "
-            "look at the camera's path, and how the sensor is mounted."
-        )
-    measured = {name for r in shop.split.fitted for name in r.measured}
-    if not {"x_m", "heading_rad"} & measured:
-        notes.append("No pose was recorded: what only a camera sees was not looked for.")
-    return tuple(notes)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gecar.reality.chain import Explanation
-from gecar.reality.comparison import Strip
 from gecar.reality.location import Map
 from gecar.reality.selection import Selection
+from gecar.reality.strip import Strip
 from gecar.world.robot import Robot
 
 

@@ -20,7 +20,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from gecar.reality.comparison import Strip
 from gecar.reality.following import (
     AHEAD,
     HEADING,
@@ -32,6 +31,7 @@ from gecar.reality.following import (
     X,
     Y,
 )
+from gecar.reality.strip import Strip
 
 Array = npt.NDArray[np.float64]
 

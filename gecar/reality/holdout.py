@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from gecar.errors import expected
 from gecar.reality.columns import COLUMNS
-from gecar.reality.comparison import Strip
 from gecar.reality.described import Change
 from gecar.reality.noise import Noise
 from gecar.reality.recording import Case, Recording
 from gecar.reality.replay import Film
+from gecar.reality.strip import Strip
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from gecar.reality.comparison import CHANNELS, Cells, Strip
 from gecar.reality.loudness import loudness, typical
 from gecar.reality.regimes import regime_masks
+from gecar.reality.strip import CHANNELS, Cells, Strip
 from gecar.reality.verdict import Place
 
 Array = npt.NDArray[np.float64]

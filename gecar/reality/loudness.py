@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.blocks import CHI_SQUARE_MEDIAN, MOST_COLOUR
-from gecar.reality.comparison import CHANNELS, Strip
 from gecar.reality.noise import PATH_CAUTION
 from gecar.reality.replay import Film
+from gecar.reality.strip import CHANNELS, Strip
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
@@ -131,7 +131,7 @@ def _aligned(pose: Array, simulated: Array, sd: Array) -> Array:
 def _add_sight(strip: Strip, before: Physics, after: Physics, out: Array, bin_s: float) -> None:
     """Add what the colour sensor saw, in standard deviations of a reading; what the path leaves is no news."""
     read = strip.recording.reflection_pct
-    seen = ~np.isnan(read)
+    seen = ~np.isnan(read - strip.reading_sd)
     at = np.minimum((strip.film.t[seen] / bin_s).astype(int), out.shape[2] - 1)
     sd = strip.noise.reflection_sd
     surplus = ((strip.reading_sd[seen] / sd) ** 2 - 1.0) / PATH_CAUTION**2

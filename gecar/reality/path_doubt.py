@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.comparison import Strip
+from gecar.reality.strip import Strip
 
 REACH_M = 0.03  # how far off a path is thought to be at most: a line and its edges are as wide
 EVEN_PCT = 2.0  # what a reading may change by within that reach where the floor is even

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.comparison import Strip
 from gecar.reality.following import AHEAD, HEADING, LEFT_SPEED, RIGHT_SPEED, YAW_RATE, X, Y
+from gecar.reality.strip import Strip
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -18,6 +18,7 @@ from gecar.reality.alignment import fitted_offsets, scattered
 from gecar.reality.comparison import Comparison
 from gecar.reality.fits import Fits
 from gecar.reality.fitting import cost
+from gecar.reality.limits import MOTION, Limits
 from gecar.reality.model import Model, Step
 from gecar.reality.recording import Recording
 from gecar.reality.screening import LEAST_GAIN
@@ -41,6 +42,8 @@ class Selection(Fits):
         Of every draw of chance.
     tell
         Called with a line of progress.
+    limits
+        What structure counts for something.
 
     Attributes
     ----------
@@ -58,8 +61,10 @@ class Selection(Fits):
         recordings: Sequence[Recording],
         seed: int = 0,
         tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+        limits: Limits = MOTION,
     ) -> None:
         super().__init__(comparison, robot, seed)
+        self.limits = limits
         self.catalogue, self.recordings, self.tell = tuple(catalogue), tuple(recordings), tell
         self.clocked = False
         self.nothing = self.bare()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gecar.reality.comparison import Strip
+from gecar.reality.strip import Strip
 from gecar.world.effects import CATALOGUE
 from gecar.world.motor import FULL_DUTY
 
@@ -47,3 +47,12 @@ def visible(strips: Sequence[Strip]) -> tuple[str, ...]:
     if not any(len(s.film.reel.pose_t) for s in strips):
         hidden |= {"pose_delay", "slippery_patch"}
     return tuple(e for e in _MOTION if e not in hidden)
+
+
+def visible_to_sight(strips: Sequence[Strip]) -> tuple[str, ...]:
+    """Return the effects of sensor and course that readings along these recordings' paths can show.
+
+    Where a start was found from the readings themselves, a shifted line is another start.
+    """
+    seen = any(s.looks and len(s.film.reel.pose_t) for s in strips)
+    return SIGHT if seen else tuple(e for e in SIGHT if e != "line_shift")

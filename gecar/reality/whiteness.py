@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gecar.reality.chain import MOTION
+from gecar.reality.limits import MOTION
 from gecar.reality.model import Model
 from gecar.reality.selection import Selection
 from gecar.reality.subtle import subtle_slopes
@@ -17,7 +17,7 @@ def whiteness(selection: Selection, model: Model) -> tuple[bool, float]:
     """Return whether a model's residuals pass for noise, and the p-value.
 
     The nulls are recordings of robots that differ from the model in every constant by less than is worth a name, with
-    white noise; but never by more than a simulation is off where nothing is missing (`chain.MOTION`). Without that
+    white noise; but never by more than a simulation is off where nothing is missing (`limits.MOTION`). Without that
     cap sensors far finer than such sizes would let anything pass: a motor on a bench, a thousandfold its noise.
     """
     if not selection.blocks.count:

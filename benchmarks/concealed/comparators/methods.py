@@ -15,7 +15,6 @@ import numpy.typing as npt
 from gecar.reality import discovery
 from gecar.reality.blocks import Blocks
 from gecar.reality.chain import MOST_EFFECTS, Explanation
-from gecar.reality.comparison import CHANNELS, Strip
 from gecar.reality.fitting import cost, weights
 from gecar.reality.freedom import free
 from gecar.reality.known_robot import known_robot
@@ -23,6 +22,7 @@ from gecar.reality.model import Effects, Model, Step, worthwhile
 from gecar.reality.replay import Film
 from gecar.reality.selection import Selection
 from gecar.reality.starts import starts
+from gecar.reality.strip import CHANNELS, Strip
 from gecar.reality.uncertainty import NORMAL_95, deviations
 from gecar.reality.verdict import NextRecording
 
