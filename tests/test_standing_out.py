@@ -27,13 +27,16 @@ def test_a_kick_at_one_place_is_unexplained_though_hardly_anything_is_left_on_th
     verdict = discover(Case("made", tuple(kicked(r, middle) for r in runs)))
     assert verdict.verdict == "unexplained"
     motion = verdict.evidence.motion
-    assert loudest_place(motion, motion.nothing) > LIMIT
+    score, spot = loudest_place(motion, motion.nothing)
+    assert score > LIMIT
+    assert abs(spot.x_m - middle) < 0.25
+    assert {place.regime for place in verdict.located if place.channel == "heading"} == {"place on the floor"}
 
 
 def test_noise_stands_out_nowhere() -> None:
     verdict = discover(Case("made", tuple(recorded(EV3, seed) for seed in range(5))))
     motion = verdict.evidence.motion
-    assert loudest_place(motion, motion.nothing) < 0.7 * LIMIT
+    assert loudest_place(motion, motion.nothing)[0] < 0.7 * LIMIT
 
 
 def test_without_poses_there_is_no_place() -> None:
@@ -41,4 +44,4 @@ def test_without_poses_there_is_no_place() -> None:
     gone = np.full_like(runs[0].t_s, np.nan)
     blind = [replace(r, x_m=gone, y_m=gone, heading_rad=gone) for r in runs]
     verdict = discover(Case("made", tuple(blind)))
-    assert loudest_place(verdict.evidence.motion, verdict.evidence.motion.nothing) == 0.0
+    assert loudest_place(verdict.evidence.motion, verdict.evidence.motion.nothing)[0] == 0.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from gecar.reality.model import Model, Step, worthwhile
 from gecar.reality.screening import ROUGH
 from gecar.reality.selection import Selection
-from gecar.reality.standing_out import stands_out
+from gecar.reality.standing_out import Spot, stands_out
 
 MOST_EFFECTS = 4
 MOST_ON_BENCH = 7  # a motor alone is known to tenths of a percent, and shows all its parts
@@ -41,12 +41,15 @@ class Explanation:
         Everything refitted at each stage, for runners-up.
     unexplained
         Whether structure is left that no effect explains.
+    spot
+        Where on the floor, if it is left at one place only.
     """
 
     taken: Model
     steps: tuple[Step, ...]
     tried: tuple[tuple[Step, ...], ...]
     unexplained: bool
+    spot: Spot | None = None
 
 
 def explain(selection: Selection) -> Explanation:
@@ -79,8 +82,10 @@ def explain(selection: Selection) -> Explanation:
         selection.limits.unexplained * selection.blocks.count,
         UNEXPLAINED_SHARE * selection.nothing.structure,
     )
-    unexplained = left.structure > floor or (not kept and stands_out(selection, left))
-    return Explanation(taken, tuple(kept), tuple(tried), unexplained)
+    if left.structure > floor or kept:
+        return Explanation(taken, tuple(kept), tuple(tried), left.structure > floor)
+    spot = stands_out(selection, left)
+    return Explanation(taken, (), tuple(tried), spot is not None, spot)
 
 
 @dataclass(frozen=True)

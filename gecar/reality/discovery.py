@@ -270,5 +270,13 @@ def _map(
     mover = moved.taken.freedom.physics(moved.taken.fit.z)
     nothing = motion.nothing.fit.errors
     return Map(
-        shop.strips, nothing, motion.cells, shop.robot.physics, mover, found.physics, explained, doubted
+        shop.strips,
+        nothing,
+        motion.cells,
+        shop.robot.physics,
+        mover,
+        found.physics,
+        explained,
+        doubted,
+        moved.spot,
     )

@@ -11,13 +11,16 @@ from scipy.stats import norm
 
 from gecar.reality.loudness import loudness, typical
 from gecar.reality.regimes import regime_masks
+from gecar.reality.standing_out import Spot
 from gecar.reality.strip import CHANNELS, Cells, Strip
 from gecar.reality.verdict import Place
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
 
+ON_THE_FLOOR = "place on the floor"
 BIN_S = 0.1
+SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happened there is felt
 SHIFTS = 499
 SURE = 0.05
 MOST = 8
@@ -51,6 +54,8 @@ class Map:
         Whether motion and sight are explained: then what an effect takes away is what it did; else all there is counts.
     doubted
         Whether what was seen speaks against the path, not the sensor: then the pose comes first.
+    spot
+        Where all that counts was left, if it is one place.
 
     Attributes
     ----------
@@ -74,6 +79,7 @@ class Map:
         after: Physics,
         explained: tuple[bool, bool] = (True, True),
         doubted: bool = False,
+        spot: Spot | None = None,
     ) -> None:
         self.strips = tuple(strips)
         self.bins = SPAN_BINS * max(int(s.film.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in strips)
@@ -84,10 +90,12 @@ class Map:
         np.add.at(count, at, 1.0)
         loud, seen = self._loud(before, moved, after, explained)
         total[SIGHT], count[SIGHT] = loud[SIGHT], seen[SIGHT]
-        self.energy = np.where(count > 0, total, 0.0)
-        self.samples = count
         self.masks, self.path = regime_masks(self.strips, before, self.bins, BIN_S)
-        self._motion_explained, self._doubted = explained[0], doubted
+        counts = np.ones(self.path.shape[:2], bool) if spot is None else _around(self.path, spot)
+        loud = loud * counts
+        self.energy = np.where((count > 0) & counts, total, 0.0)
+        self.samples = count
+        self._motion_explained, self._doubted, self.spot = explained[0], doubted, spot
         spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
         self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
 
@@ -186,7 +194,9 @@ class Map:
         p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + SHIFTS))
         loud, spans = self._spans(channel)
         name = self.strips[loud].recording.name
-        return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
+        if self.spot is None:
+            return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
+        return Place(CHANNELS[channel], ON_THE_FLOOR, 1.0, round(p, 3), spans, name, (*self.spot, SPOT_M))
 
     def _spot(self, channel: int, rng: np.random.Generator) -> tuple[float, Place] | None:
         """Return the disc on the floor that holds most energy beyond its share of the time."""
@@ -207,7 +217,7 @@ class Map:
             return None
         x, y, radius = best[1]
         mask = seen & (np.hypot(self.path[:, :, 0] - x, self.path[:, :, 1] - y) < radius)
-        return self._judge(channel, "place on the floor", mask, rng, best[1])
+        return self._judge(channel, ON_THE_FLOOR, mask, rng, best[1])
 
 
 def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generator) -> Array:
@@ -221,3 +231,10 @@ def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generato
     shifts = rng.integers(0, bins, (SHIFTS, len(energy)))
     drawn: Array = inside[np.arange(len(energy)), shifts].sum(axis=1)
     return drawn
+
+
+def _around(path: Array, spot: Spot) -> npt.NDArray[np.bool_]:
+    """Return when a robot was near a spot or had just left it, shape (recordings, bins)."""
+    near = np.hypot(path[:, :, 0] - spot.x_m, path[:, :, 1] - spot.y_m) < SPOT_M
+    felt = np.ones(1 + round(SPOT_S / BIN_S))
+    return np.stack([np.convolve(row, felt)[: len(row)] > 0 for row in near])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -19,22 +21,34 @@ LEAST_BLOCKS = 10
 LIMIT = 22.0
 
 
-def stands_out(selection: Selection, model: Model) -> bool:
-    """Return whether a model of motion leaves structure that gathers at one place; without poses there is no place."""
-    return not selection.comparison.sight and loudest_place(selection, model) >= LIMIT
+class Spot(NamedTuple):
+    """The middle of a cell of the floor [m]."""
+
+    x_m: float
+    y_m: float
 
 
-def loudest_place(selection: Selection, model: Model) -> float:
-    """Return the structure gathered in the loudest cell of the floor, in standard deviations of noise."""
+def stands_out(selection: Selection, model: Model) -> Spot | None:
+    """Return the place at which what a model of motion leaves gathers, None if there is none; it takes poses."""
+    if selection.comparison.sight:
+        return None
+    score, spot = loudest_place(selection, model)
+    return spot if score >= LIMIT else None
+
+
+def loudest_place(selection: Selection, model: Model) -> tuple[float, Spot]:
+    """Return the structure gathered in the loudest cell of the floor, in standard deviations of noise, and where."""
     cells = _cells(selection, model)
     there = ~np.isnan(cells[:, 0])
     if not there.any():
-        return 0.0
+        return 0.0, Spot(np.nan, np.nan)
     excess = np.minimum(selection.blocks.excess(model.fit.errors)[there], MOST_OF_A_BLOCK)
-    of = np.unique(cells[there], axis=0, return_inverse=True)[1].ravel()
-    count = np.bincount(of)
-    scores = np.bincount(of, excess) / np.sqrt(2.0 * count)
-    return float(np.max(scores[count >= LEAST_BLOCKS], initial=0.0))
+    places, of = np.unique(cells[there], axis=0, return_inverse=True)
+    count = np.bincount(of.ravel())
+    scores = np.where(count >= LEAST_BLOCKS, np.bincount(of.ravel(), excess) / np.sqrt(2.0 * count), 0.0)
+    best = int(np.argmax(scores))
+    x, y = (places[best] + 0.5) * CELL_M
+    return max(float(scores[best]), 0.0), Spot(float(x), float(y))
 
 
 def _cells(selection: Selection, model: Model) -> Array:
