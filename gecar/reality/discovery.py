@@ -96,22 +96,11 @@ def discover(
     """
     shop = _open(case, holdout, robot, seed, workers, tell)
     tell(f"fitting on {', '.join(r.name for r in shop.split.fitted)}")
-    motion = Selection(
-        Comparison(shop.strips, False, shop.pool),
-        shop.robot,
-        visible(shop.strips),
-        shop.split.fitted,
-        seed,
-        tell,
-    )
-    moved = explain(motion)
-    colour = motion.blocks.colour(motion.rid_of_subtle(moved.taken).fit.errors)[list(POSES)]
+    motion, moved, colour = _move(shop)
     sight, seen = _look(shop, moved, colour)
     found_robot = shop.robot.with_effects({**moved.taken.values, **(seen.taken.values if seen else {})})
     tell("intervals, alternatives, whereabouts")
-    if motion.clocked:
-        _set_clocks(shop, found_robot)
-    judgement = _judge(shop, found_robot, colour)
+    judgement = _judge(shop, motion, found_robot, colour)
     found, rivals = _found(shop, motion, moved, found_robot)
     if sight and seen:
         more, others = _found(shop, sight, seen, found_robot)
@@ -176,6 +165,17 @@ def _open(
     )
 
 
+def _move(shop: _Workshop) -> tuple[Selection, Explanation, Array]:
+    """Explain how the robot moved; with it, by how much slow noise exceeds white noise in the pose, shape (3,)."""
+    comparison = Comparison(shop.strips, False, shop.pool)
+    selection = Selection(
+        comparison, shop.robot, visible(shop.strips), shop.split.fitted, shop.seed, shop.tell
+    )
+    moved = explain(selection)
+    left = selection.rid_of_subtle(moved.taken).fit.errors
+    return selection, moved, selection.blocks.colour(left)[list(POSES)]
+
+
 def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection | None, Explanation | None]:
     """Explain what the colour sensor saw along the measured path."""
     mover = moved.taken.freedom.physics(moved.taken.fit.z)
@@ -200,7 +200,9 @@ def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection
     return selection, replace(seen, taken=levelled(selection, seen.taken))
 
 
-def _judge(shop: _Workshop, found: Robot, colour: Array) -> Judgement:
+def _judge(shop: _Workshop, motion: Selection, found: Robot, colour: Array) -> Judgement:
+    if motion.clocked:
+        _set_clocks(shop, found)
     list(shop.pool.map(lambda strip: strip.locate(found.physics), shop.held))
     sight = Comparison(shop.held, True, shop.pool)
     sight.set_path(found.physics, colour)

@@ -44,45 +44,68 @@ def rough_search(
     wider
         Times so many trials, where there are many valleys.
     """
-    k = len(start)
-    trials = wider * (7 + int(3 * math.log(k)) if k > 1 else 6)
-    parents = trials // 2
-    weight = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
-    weight /= weight.sum()
-    mass = 1.0 / float(np.sum(weight**2))
-    c_sigma = (mass + 2.0) / (k + mass + 5.0)
-    damp = 1.0 + c_sigma + 2.0 * max(0.0, math.sqrt((mass - 1.0) / (k + 1.0)) - 1.0)
-    c_path = (4.0 + mass / k) / (k + 4.0 + 2.0 * mass / k)
-    c_one = 2.0 / ((k + 1.3) ** 2 + mass)
-    c_mu = min(1.0 - c_one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((k + 2.0) ** 2 + mass))
-    usual = math.sqrt(k) * (1.0 - 1.0 / (4.0 * k) + 1.0 / (21.0 * k * k))
-    mean, sigma, shape = np.zeros(k), 1.0, np.eye(k)
-    path, path_sigma = np.zeros(k), np.zeros(k)
-    best, best_cost = np.clip(start, *bounds), cost(np.clip(start, *bounds))
-    mentioned, since = best_cost, 0
-    for generation in range(generations):
-        values, axes = np.linalg.eigh(shape)
-        root = axes * np.sqrt(np.maximum(values, 1e-12))
-        steps = rng.standard_normal((trials, k)) @ root.T
-        places = np.clip(start + spread * (mean + sigma * steps), *bounds)
+    trials = wider * (7 + int(3 * math.log(len(start))) if len(start) > 1 else 6)
+    strategy = _Strategy(len(start), trials)
+    best, least = np.clip(start, *bounds), cost(np.clip(start, *bounds))
+    mentioned, since = least, 0
+    for _ in range(generations):
+        steps = strategy.ask(rng)
+        places = np.clip(start + spread * (strategy.mean + strategy.sigma * steps), *bounds)
         found = np.array([cost(place) for place in places])
         order = np.argsort(found)
-        if found[order[0]] < best_cost:
-            best, best_cost = places[order[0]], float(found[order[0]])
+        if found[order[0]] < least:
+            best, least = places[order[0]], float(found[order[0]])
         since += 1
-        if best_cost < mentioned - MENTIONED:
-            mentioned, since = best_cost, 0
+        if least < mentioned - MENTIONED:
+            mentioned, since = least, 0
         if since >= PATIENCE:
             break
-        move = weight @ steps[order[:parents]]
-        mean = mean + sigma * move
-        path_sigma = (1 - c_sigma) * path_sigma + math.sqrt(c_sigma * (2 - c_sigma) * mass) * (
-            axes @ ((axes.T @ move) / np.sqrt(np.maximum(values, 1e-12)))
+        strategy.tell(steps[order])
+    return best, least
+
+
+class _Strategy:
+    """Mean, size and shape of a cloud of trials, and how they adapt; names are those of the source."""
+
+    def __init__(self, k: int, trials: int) -> None:
+        self.trials = trials
+        weight = math.log(trials // 2 + 0.5) - np.log(np.arange(1, trials // 2 + 1))
+        self._weight = weight / weight.sum()
+        mass = 1.0 / float(np.sum(self._weight**2))
+        self._c_sigma = (mass + 2.0) / (k + mass + 5.0)
+        self._damp = 1.0 + self._c_sigma + 2.0 * max(0.0, math.sqrt((mass - 1.0) / (k + 1.0)) - 1.0)
+        self._c_path = (4.0 + mass / k) / (k + 4.0 + 2.0 * mass / k)
+        self._c_one = 2.0 / ((k + 1.3) ** 2 + mass)
+        c_mu = 2.0 * (mass - 2.0 + 1.0 / mass) / ((k + 2.0) ** 2 + mass)
+        self._c_mu, self._mass = min(1.0 - self._c_one, c_mu), mass
+        self._usual = math.sqrt(k) * (1.0 - 1.0 / (4.0 * k) + 1.0 / (21.0 * k * k))
+        self.mean, self.sigma, self._shape = np.zeros(k), 1.0, np.eye(k)
+        self._path, self._path_sigma, self._told = np.zeros(k), np.zeros(k), 0
+        self._axes, self._lengths = np.eye(k), np.ones(k)
+
+    def ask(self, rng: np.random.Generator) -> Array:
+        """Draw a generation's steps from the mean, shape (trials, k)."""
+        values, self._axes = np.linalg.eigh(self._shape)
+        self._lengths = np.sqrt(np.maximum(values, 1e-12))
+        steps: Array = rng.standard_normal((self.trials, len(values))) @ (self._axes * self._lengths).T
+        return steps
+
+    def tell(self, steps: Array) -> None:
+        """Adapt to a generation's steps, the best first."""
+        steps = steps[: len(self._weight)]
+        move = self._weight @ steps
+        self.mean = self.mean + self.sigma * move
+        self._told += 1
+        c = self._c_sigma
+        self._path_sigma = (1 - c) * self._path_sigma + math.sqrt(c * (2 - c) * self._mass) * (
+            self._axes @ ((self._axes.T @ move) / self._lengths)
         )
-        length = float(np.linalg.norm(path_sigma))
-        calm = length / math.sqrt(1 - (1 - c_sigma) ** (2 * generation + 2)) < (1.4 + 2 / (k + 1)) * usual
-        path = (1 - c_path) * path + calm * math.sqrt(c_path * (2 - c_path) * mass) * move
-        spread_out = sum(w * np.outer(s, s) for w, s in zip(weight, steps[order[:parents]], strict=True))
-        shape = (1 - c_one - c_mu) * shape + c_one * np.outer(path, path) + c_mu * spread_out
-        sigma *= math.exp(min((c_sigma / damp) * (length / usual - 1.0), 1.0))
-    return best, best_cost
+        length = float(np.linalg.norm(self._path_sigma))
+        settled = math.sqrt(1 - (1 - c) ** (2 * self._told))
+        calm = length / settled < (1.4 + 2 / (len(move) + 1)) * self._usual
+        kept = math.sqrt(self._c_path * (2 - self._c_path) * self._mass)
+        self._path = (1 - self._c_path) * self._path + calm * kept * move
+        wide = sum(w * np.outer(s, s) for w, s in zip(self._weight, steps, strict=True))
+        along = np.outer(self._path, self._path)
+        self._shape = (1 - self._c_one - self._c_mu) * self._shape + self._c_one * along + self._c_mu * wide
+        self.sigma *= math.exp(min((c / self._damp) * (length / self._usual - 1.0), 1.0))
