@@ -36,7 +36,9 @@ def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> 
     centres = (np.arange(bins) + 0.5) * bin_s
     at = np.minimum(np.searchsorted(t, centres), len(t) - 1)
     there = centres <= t[-1]
-    rows, duty = rows[at], strip.recording.commands[at]
+    pose = strip.path if strip.began is not None else rows[:, [X, Y, HEADING]]
+    placed = strip.began is not None or len(strip.film.reel.pose_t) > 0
+    rows, pose, duty = rows[at], pose[at], strip.recording.commands[at]
     left, right, yaw, ahead = (rows[:, k] for k in (LEFT_SPEED, RIGHT_SPEED, YAW_RATE, AHEAD))
     fastest = max(float(np.abs(rows[:, [LEFT_SPEED, RIGHT_SPEED]]).max()), 1e-9)
     speed = np.maximum(np.abs(left), np.abs(right))
@@ -59,14 +61,13 @@ def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> 
         "early": centres < t[-1] / 3.0,
         "late": centres > 2.0 * t[-1] / 3.0,
     }
-    heading = rows[:, HEADING]
     for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
-        masks[name] = (np.cos(heading - way * np.pi) > np.sqrt(0.5)) & moving
+        masks[name] = (np.cos(pose[:, 2] - way * np.pi) > np.sqrt(0.5)) & moving & placed
     if strip.looks:
         masks["on the line's edge"] = _edges(strip, physics, at)
     else:
         masks["on the line's edge"] = np.zeros(bins, bool)
-    path = np.where(there[:, None] & (len(strip.film.reel.pose_t) > 0), rows[:, [X, Y]], np.nan)
+    path = np.where(there[:, None] & placed, pose[:, :2], np.nan)
     return {name: mask & there for name, mask in masks.items()}, path
 
 
