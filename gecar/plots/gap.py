@@ -70,43 +70,32 @@ def _styles(trials: Sequence[Trial]) -> list[dict[str, Any]]:
 
 def _paths(axes: Axes, found: Gap) -> None:
     """Draw the ways over the course, as in the paper's Fig. 9: simulation solid, recordings broken."""
-    if found.course is not None:
-        draw_course(axes, found.course)
-        veil = Rectangle(
-            (0, 0), found.course.width_m, found.course.height_m, facecolor=PAPER, alpha=0.6, zorder=2.5
-        )
-        axes.add_patch(veil)  # the paths matter here, not the line
-    else:
-        axes.set(xlabel="x [m]", ylabel="y [m]")
-        axes.set_aspect("equal", adjustable="datalim")
+    _floor(axes, found)
+    whole = slice(None)
     for trial, style in zip(found.trials, _styles(found.trials), strict=True):
         end = np.searchsorted(trial.path.t_s, trial.arrival_s, side="right")
-        _way(
-            axes,
-            trial.path,
-            slice(None, max(int(end), 2)),
-            linewidth=1.5,
-            zorder=4,
-            label=trial.name,
-            **style,
-        )
+        until = slice(None, max(int(end), 2))
+        _way(axes, trial.path, until, linewidth=1.5, zorder=4, label=trial.name, **style)
         if found.simulated_s is None:
-            _way(
-                axes, trial.simulated, slice(None), linewidth=1.2, zorder=3.9, color=style["color"], alpha=0.6
-            )
+            thin = {"linewidth": 1.2, "zorder": 3.9, "alpha": 0.6}
+            _way(axes, trial.simulated, whole, color=style["color"], **thin)
     if found.simulated_s is not None:
-        _way(
-            axes,
-            found.trials[0].simulated,
-            slice(None),
-            color=INK,
-            linewidth=2.0,
-            zorder=5,
-            label="simulation",
-        )
+        bold = {"linewidth": 2.0, "zorder": 5, "label": "simulation"}
+        _way(axes, found.trials[0].simulated, whole, color=INK, **bold)
     axes.legend(
         loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=min(6, len(found.trials) + 1), handlelength=2.6
     )
+
+
+def _floor(axes: Axes, found: Gap) -> None:
+    """Draw the course under a veil: the paths matter here, not the line."""
+    if found.course is None:
+        axes.set(xlabel="x [m]", ylabel="y [m]")
+        axes.set_aspect("equal", adjustable="datalim")
+        return
+    draw_course(axes, found.course)
+    size = found.course.width_m, found.course.height_m
+    axes.add_patch(Rectangle((0, 0), *size, facecolor=PAPER, alpha=0.6, zorder=2.5))
 
 
 def _way(axes: Axes, path: Path, part: slice, **style: Any) -> None:

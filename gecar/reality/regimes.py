@@ -31,21 +31,29 @@ def regime_masks(
 
 
 def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> tuple[dict[str, Mask], Array]:
-    rows = strip.film.play(physics)[0]
-    t = strip.film.t
+    rows, t = strip.film.play(physics)[0], strip.film.t
+    pose = strip.path if strip.began is not None else rows[:, [X, Y, HEADING]]
+    placed = strip.began is not None or len(strip.film.reel.pose_t) > 0
     centres = (np.arange(bins) + 0.5) * bin_s
     at = np.minimum(np.searchsorted(t, centres), len(t) - 1)
     there = centres <= t[-1]
-    pose = strip.path if strip.began is not None else rows[:, [X, Y, HEADING]]
-    placed = strip.began is not None or len(strip.film.reel.pose_t) > 0
-    rows, pose, duty = rows[at], pose[at], strip.recording.commands[at]
+    masks = _motions(rows[at], strip.recording.commands[at], max(int(AFTER_S / bin_s), 1))
+    masks["early"], masks["late"] = centres < t[-1] / 3.0, centres > 2.0 * t[-1] / 3.0
+    for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
+        masks[name] = (np.cos(pose[at, 2] - way * np.pi) > np.sqrt(0.5)) & ~masks["standing"] & placed
+    masks["on the line's edge"] = _edges(strip, physics, at) if strip.looks else np.zeros(bins, bool)
+    path = np.where(there[:, None] & placed, pose[at, :2], np.nan)
+    return {name: mask & there for name, mask in masks.items()}, path
+
+
+def _motions(rows: Array, duty: Array, felt: int) -> dict[str, Mask]:
+    """Return regimes that the motion and the commands themselves tell, by name; an event is felt for so many bins."""
     left, right, yaw, ahead = (rows[:, k] for k in (LEFT_SPEED, RIGHT_SPEED, YAW_RATE, AHEAD))
     fastest = max(float(np.abs(rows[:, [LEFT_SPEED, RIGHT_SPEED]]).max()), 1e-9)
     speed = np.maximum(np.abs(left), np.abs(right))
     moving = speed > RESTING
-    felt = max(int(AFTER_S / bin_s), 1)
     stepped = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1) > STEP
-    masks = {
+    return {
         "from rest": _after(_risen(moving), felt),
         "reversal": _after(_turned(left) | _turned(right), felt),
         "change of command": _after(stepped, felt),
@@ -58,17 +66,7 @@ def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> 
         "straight": (np.abs(yaw) < STRAIGHT) & moving,
         "forward": ahead > 0.02,
         "backward": ahead < -0.02,
-        "early": centres < t[-1] / 3.0,
-        "late": centres > 2.0 * t[-1] / 3.0,
     }
-    for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
-        masks[name] = (np.cos(pose[:, 2] - way * np.pi) > np.sqrt(0.5)) & moving & placed
-    if strip.looks:
-        masks["on the line's edge"] = _edges(strip, physics, at)
-    else:
-        masks["on the line's edge"] = np.zeros(bins, bool)
-    path = np.where(there[:, None] & placed, pose[:, :2], np.nan)
-    return {name: mask & there for name, mask in masks.items()}, path
 
 
 def _after(event: Mask, length: int) -> Mask:
