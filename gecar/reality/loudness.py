@@ -6,7 +6,6 @@ heading that is off has carried the position away. Start angles and start pose o
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -60,8 +59,7 @@ def stretch_errors(strip: Strip, physics: Physics) -> list[tuple[int, Array, Arr
 
     Every stretch is replayed from its own start: start angles and start pose are taken out.
     """
-    film = copy.copy(strip.film)
-    film.reel = film.reel._replace(memory=np.inf)
+    film = strip.film.open_loop()
     rows, _, poses, _ = film.play(physics)
     return [*_of_rows(film, rows), *_of_poses(film, poses)]
 

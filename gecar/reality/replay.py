@@ -6,6 +6,7 @@ replay(recording, robot, memory_s=1)   # re-based on the measurement, over about
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -109,6 +110,12 @@ class Film:
     def t(self) -> Array:
         """Times of the rows from the start of the simulation [s], shape (rows,)."""
         return self.reel.t[self._extra :]
+
+    def open_loop(self) -> Film:
+        """Return the same recording to be replayed whole, never re-based on what was measured."""
+        whole = copy.copy(self)
+        whole.reel = self.reel._replace(memory=np.inf)
+        return whole
 
     def play(
         self, physics: npt.NDArray[Any], start: Array | None = None

@@ -13,7 +13,7 @@ from gecar.reality.whereabouts import moved
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
-Along = Callable[[Array, Physics], Array]
+Along = Callable[..., Array]
 
 STEPS = np.array([0.001, 0.001, 0.005])  # what a start is refitted in [m, m, rad]
 WITHIN = 30.0  # of them
@@ -35,7 +35,7 @@ def settled(path: Array, readings: Array, physics: Physics, along: Along) -> Arr
     physics
         Record of the model, shape (1,).
     along
-        Predicts readings along a path, or along every so manieth row of it, under a physics record.
+        Predicts readings along a path of every n-th row, under a physics record: ``along(path, physics, every=n)``.
     """
     whole, path, readings = path, path[::EVERY], readings[::EVERY]
     near, least = _nearby(path, readings, physics, along)
@@ -54,7 +54,7 @@ def _nearby(path: Array, readings: Array, physics: Physics, along: Along) -> tup
     there = ~np.isnan(readings)
 
     def misfit(z: Array) -> Array:
-        errors = along(moved(path, path[0] + z * STEPS), physics) - readings
+        errors = along(moved(path, path[0] + z * STEPS), physics, every=EVERY) - readings
         return errors[there] / READING_SD
 
     far = np.full(3, WITHIN)

@@ -118,12 +118,15 @@ class Strip:
         return self._along(self.path, physics, shift, late)
 
     def _along(
-        self, path: Array, physics: npt.NDArray[Any], shift: Array = NO_SHIFT, late: float = 0.0
+        self,
+        path: Array,
+        physics: npt.NDArray[Any],
+        shift: Array = NO_SHIFT,
+        late: float = 0.0,
+        every: int = 1,
     ) -> Array:
         assert self.course is not None
-        t, pitch = self.film.t, self.course.pitch_m
-        if len(path) < len(t):  # a sample of the rows
-            t = t[:: -(-len(t) // len(path))]
+        t, pitch = self.film.t[::every], self.course.pitch_m
         readings = np.empty(len(t))
         floor, sd = self.course.raster(pitch), self.noise.reflection_sd
         look_along(t, path, late, sd, floor, pitch, physics, shift, readings)
