@@ -27,7 +27,7 @@ def toy_scores(
     scores = np.zeros(len(programs), score_type(n_arrivals))
     for score, opcodes in zip(scores, programs, strict=True):
         total = int(np.abs(opcodes[:, 1:4]).sum())
-        score["fitness_s"] = UNSOLVED if total % 2 else 10.0 + 7919 * total % 1_000 / 100
+        score["fitness_s"] = score["merit_s"] = UNSOLVED if total % 2 else 10.0 + 7919 * total % 1_000 / 100
         score["share"] = (total % 7) / 7
         score["outcome"] = 2 if total % 2 else 1
         score["steps"] = total

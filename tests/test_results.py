@@ -366,7 +366,7 @@ def test_a_forged_checkpoint_is_refused(body: bytes) -> None:
 
 
 def test_a_checkpoint_of_a_later_version_is_refused_as_such() -> None:
-    with pytest.raises(InputError, match="found a checkpoint of version '3', expected version 2"):
+    with pytest.raises(InputError, match="found a checkpoint of version '4', expected version 3"):
         unpack(WHOLE.replace(b"checkpoint 2", b"checkpoint 3", 1), "mine", HERE)
 
 

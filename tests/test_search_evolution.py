@@ -206,7 +206,7 @@ def test_plain_seconds_are_scores_too() -> None:
 
 def test_credit_orders_what_misses_goal_and_never_reaches_above_the_cliff() -> None:
     scores = invalid_scores(4)
-    scores["fitness_s"][3] = 59.9
+    scores["merit_s"][3] = 59.9
     scores["share"][1:3] = 0.1, 0.8
     assert np.argsort(merit(scores, checkpoint_credit=True)).tolist() == [3, 2, 1, 0]
     assert merit(scores, checkpoint_credit=True)[:3].min() > UNSOLVED

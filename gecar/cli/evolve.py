@@ -58,15 +58,13 @@ def evolve(
     robot: RobotOption = None,
     noise: NoiseOption = None,
     motor_noise: MotorNoiseOption = None,
-    robust: Annotated[
+    draws: Annotated[
         int | None,
-        typer.Option("--robust", metavar="K", show_default="0", rich_help_panel=SEARCH,
-                     help="Perturbed robots a program must bring to GOAL beside the nominal one."),
+        _search("--draws", "Drives a program is judged by, under conditions drawn afresh; 1: the nominal drive alone.",
+                "16; paper: 1", "K"),
     ] = None,
-    robust_by: Annotated[
-        str | None,
-        typer.Option("--robust-by", metavar="mean|worst", help="Which of their times is the fitness.",
-                     show_default="mean", rich_help_panel=SEARCH),
+    share: Annotated[
+        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.95")
     ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
@@ -119,11 +117,11 @@ def evolve(
     search = {
         "population": population, "generations": generations, "codons": codons, "elites": elites,
         "tournament": tournament, "crossover_rate": crossover_rate, "mutation_rate": mutation_rate,
+        "draws": draws, "arrival_share": share,
     }  # fmt: skip
     options = {
         "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
         "time_limit_s": time_limit, "engine": engine, "noise": noise, "motor_noise": motor_noise, "wraps": wraps,
-        "robust": robust, "robust_by": robust_by,
         "executor": executor or ("dask" if scheduler else None), "scheduler": scheduler,
     }  # fmt: skip
     changes = given(options) | {"search": given(search) | settings(setting or [])}

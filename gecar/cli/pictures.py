@@ -18,7 +18,7 @@ from gecar.plots.genealogy import genealogy
 from gecar.plots.style import save
 from gecar.plots.trajectory import trajectory
 from gecar.plots.tree import tree_of
-from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
+from gecar.report.drive import PAPER_BEST_S, detail_of, short_arrival, title_of
 from gecar.report.run import run_detail, run_title
 from gecar.report.runs import group_names, summaries, summary_table
 from gecar.results.ancestry import Ancestry, read_ancestry
@@ -26,8 +26,12 @@ from gecar.results.config import Config
 from gecar.results.folder import read_history, read_result
 from gecar.results.running import load_task
 from gecar.world.course import load_course
+from gecar.world.perturbation import under_drawn_conditions
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
+
+SHOWN = 20
+"""Drives under drawn conditions that a picture shows."""
 
 
 def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
@@ -83,7 +87,11 @@ def draw_trajectory(folder: Path, target: Path) -> Path:
     world, program = build_world(settings), read_program(file)
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
     title, detail = title_of(drive, world.course), detail_of(world, drive)
-    return save(trajectory(world, program, drive, title=title, detail=detail), target)
+    share = short_arrival(read_result(folder).get("arrives"))
+    others = under_drawn_conditions(world, program.opcodes, SHOWN)
+    detail += f" · thin: {SHOWN} drives under other conditions"
+    title = ", ".join(filter(None, [title, share]))
+    return save(trajectory(world, program, drive, title=title, detail=detail, others=others), target)
 
 
 def draw_tree(folder: Path, target: Path) -> Path:

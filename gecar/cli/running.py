@@ -14,7 +14,7 @@ from gecar.cli.progress import Watch
 from gecar.cli.voice import Voice
 from gecar.cli.worlds import drive_seed
 from gecar.compiled import is_cold, mark_warm
-from gecar.report.drive import sentence_of, standing_of
+from gecar.report.drive import arrival_of, sentence_of, standing_of
 from gecar.report.run import effort_of
 from gecar.results.config import configure, merged, read_config
 from gecar.results.running import Started, finish, resume, start
@@ -109,6 +109,7 @@ def _tell(voice: Voice, started: Started, result: dict[str, Any], pictures: list
         drive = simulate(world, best.program.opcodes, seed)
         voice.say(sentence_of(drive))
         voice.say(standing_of(world, drive))
+        voice.say(arrival_of(result["arrives"]))
         same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
         voice.say(f"With pymunk moving the body, the drive {same}.")
     voice.say(effort_of(result))

@@ -94,7 +94,8 @@ def simulate(
     """
     from gecar.cli.worlds import build_world, drive_seed, find_program
     from gecar.language.program import read_program
-    from gecar.report.drive import drive_table, sentence_of, standing_of
+    from gecar.report.drive import arrival_of, drive_table, sentence_of, standing_of
+    from gecar.results.running import arrives
     from gecar.world.rollout import simulate as run
 
     voice = Voice(as_json)
@@ -109,11 +110,15 @@ def simulate(
     drive = run(world, loaded.opcodes, which, trace=True)
     voice.say(sentence_of(drive), style="bold")
     voice.say(standing_of(world, drive))
+    arrival = arrives(world, loaded, which)
+    voice.say(arrival_of(arrival))
     written = _draw(voice, world, loaded, drive, target, colour)
     written |= _film(voice, world, loaded, drive, animate, pace)
     written |= _play(voice, world, loaded, drive, page)
     written |= _record(voice, world, loaded, drive, record, course)
-    voice.answer({"program": loaded.source, **drive_table(world, drive), "seed": which, **written})
+    voice.answer(
+        {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
+    )
 
 
 def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:

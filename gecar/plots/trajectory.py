@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -13,9 +15,9 @@ from gecar.plots.listing import Listing
 from gecar.plots.obstacles import draw_moved
 from gecar.plots.path import Colouring, by_line, by_speed, draw_path, every_distance
 from gecar.plots.robot import RobotArtist, shape_of
-from gecar.plots.style import SPEED_COLOURS, headline, look, new_figure
+from gecar.plots.style import INK, SPEED_COLOURS, headline, look, new_figure
 from gecar.plots.traces import HEIGHT_RATIOS, draw_traces
-from gecar.world.rollout import Drive, World
+from gecar.world.rollout import Drive, Outcome, World
 
 WIDTH_IN = 11.0
 MAP_WIDTH_IN = 7.8
@@ -25,7 +27,14 @@ COLOURINGS = ("auto", "line", "speed")
 
 
 def trajectory(
-    world: World, program: Program, drive: Drive, *, title: str = "", detail: str = "", colour: str = "auto"
+    world: World,
+    program: Program,
+    drive: Drive,
+    *,
+    title: str = "",
+    detail: str = "",
+    colour: str = "auto",
+    others: Sequence[Drive] = (),
 ) -> Figure:
     """Draw a drive.
 
@@ -38,6 +47,8 @@ def trajectory(
     colour
         ``"line"``: the way's colour says which line of the program drives; ``"speed"``: how fast it is.
         ``"auto"``: by line, where there are few enough to tell apart.
+    others
+        Drives of the same program under other conditions, with traces: drawn thin behind it.
 
     Raises
     ------
@@ -59,6 +70,7 @@ def trajectory(
         traces = [figure.add_subplot(grid[row, :]) for row in range(1, 5)]
         draw_traces(traces, drive.trace, colouring, program.opcodes)
         floor = figure.add_subplot(grid[0, 0])
+        _draw_others(floor, others)
         draw_map(floor, world, drive, colouring)
         if not colouring.lines:
             _speed_key(figure, floor, world)
@@ -108,6 +120,16 @@ def draw_map(axes: Axes, world: World, drive: Drive, colouring: Colouring) -> No
         last = sample == at[-1]
         robot = RobotArtist(axes, shape_of(world.robot), 1.0 if last else 0.22, 6.0 if last else 3.0)
         robot.move(trace["x_m"][sample], trace["y_m"][sample], trace["heading_rad"][sample])
+
+
+def _draw_others(axes: Axes, others: Sequence[Drive]) -> None:
+    """Draw the ways of other drives, and where those ended that missed GOAL."""
+    for other in others:
+        if other.trace is not None:
+            x, y = other.trace["x_m"], other.trace["y_m"]
+            axes.plot(x, y, color=INK, linewidth=0.5, alpha=0.22, zorder=2.2)
+            if other.outcome != Outcome.GOAL:
+                axes.plot(x[-1], y[-1], "x", color=INK, markersize=5, zorder=4)
 
 
 def _speed_key(figure: Figure, axes: Axes, world: World) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,29 @@ def sentence_of(drive: Drive) -> str:
     if drive.outcome == Outcome.GOAL:
         return f"The robot reached GOAL through all checkpoints in {drive.time_s:.2f} s."
     return f"The robot {drive.outcome.sentence} after {drive.time_s:.2f} s."
+
+
+def arrival_of(arrives: Mapping[str, Any]) -> str:
+    """Say in a sentence or two how a program arrives under fresh conditions and at other steps, from result.json."""
+    if not arrives["of"]:
+        return "There is no program to drive under other conditions."
+    words = f"Of {arrives['of']} drives under fresh conditions {arrives['share']:.1%} arrive"
+    if arrives["median_s"] is not None:
+        words += f", in {arrives['median_s']:.2f} s (median; 95 % of these within {arrives['p95_s']:.2f} s)"
+    return f"{words}. {_steps_of(arrives['steps'])}"
+
+
+def _steps_of(times: Mapping[str, float | None]) -> str:
+    missed = [f"{1000 * float(step):g}" for step, time in times.items() if time is None]
+    arrived = [time for time in times.values() if time is not None]
+    if missed:
+        return f"Simulated at a step of {', '.join(missed)} ms it does not arrive."
+    return f"Simulated at steps of 4 to 0.25 ms it arrives in {min(arrived):.2f} to {max(arrived):.2f} s."
+
+
+def short_arrival(arrives: Mapping[str, Any] | None) -> str:
+    """Say in few words which share of drives under fresh conditions arrives; empty for results that do not know."""
+    return f"arrives in {arrives['share']:.0%} of {arrives['of']} drives" if arrives and arrives["of"] else ""
 
 
 def standing_of(world: World, drive: Drive) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from gecar.report.drive import short_arrival
 from gecar.results.config import Config
 from gecar.world.course import load_course
 
@@ -14,7 +15,8 @@ def run_title(config: Config, result: Mapping[str, Any]) -> str:
     course = load_course(config.course)
     where = course.title or course.name
     if result["solved"]:
-        return f"{where}: GOAL in {result['fitness_s']:.2f} s after {result['generations']} generations"
+        words = f"{where}: GOAL in {result['fitness_s']:.2f} s after {result['generations']} generations"
+        return ", ".join(filter(None, [words, short_arrival(result.get("arrives"))]))
     return f"{where}: no program at GOAL after {result['generations']} generations"
 
 

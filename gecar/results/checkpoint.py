@@ -1,6 +1,6 @@
 """The checkpoint: an evolution's state as plain bytes, with a checksum, and nothing that could be executed.
 
-A line ``gecar checkpoint 2 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
+A line ``gecar checkpoint 3 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
 and the arrays one after the other, little-endian, in the order of `_layout`; the lineage is packed by zlib.
 """
 
@@ -22,7 +22,7 @@ from gecar.search.phenotypes import DIGEST_BYTES
 from gecar.search.state import State
 
 _MAGIC = b"gecar checkpoint "
-_VERSION = b"2"
+_VERSION = b"3"
 
 
 def pack(state: State, configuration: str) -> bytes:
@@ -35,15 +35,15 @@ def pack(state: State, configuration: str) -> bytes:
     configuration
         What identifies the run's configuration.
     """
-    codons, n_arrivals = len(state.best_genome), state.scores.dtype["arrival_s"].shape[0]
-    arrays = {name: getattr(state, name) for name in _layout(codons, n_arrivals)}
+    kind = state.scores.dtype
+    sizes = len(state.best_genome), kind["arrival_s"].shape[0], kind["drawn_s"].shape[0]
+    arrays = {name: getattr(state, name) for name in _layout(*sizes)}
     arrays["lineage"] = np.frombuffer(zlib.compress(state.lineage.tobytes(), level=1), np.uint8)
     header = {
         "configuration": configuration,
         "seed": state.seed,
         "best_generation": state.best_generation,
-        "codons": codons,
-        "n_arrivals": n_arrivals,
+        "sizes": sizes,
         "rows": {name: len(array) for name, array in arrays.items()},
     }
     body = b"".join([json.dumps(header).encode(), b"\n", *(array.tobytes() for array in arrays.values())])
@@ -93,7 +93,7 @@ def _read(body: bytes, configuration: str, where: Path) -> State:
             where, "a checkpoint from another configuration", "one that belongs to the config.toml beside it"
         )
     arrays, used = {}, 0
-    for name, kind in _layout(header["codons"], header["n_arrivals"]).items():
+    for name, kind in _layout(*header["sizes"]).items():
         size = header["rows"][name] * kind.itemsize
         flat = np.frombuffer(rest[used : used + size], kind.base)
         arrays[name] = flat.reshape(header["rows"][name], *kind.shape).copy()
@@ -104,14 +104,17 @@ def _read(body: bytes, configuration: str, where: Path) -> State:
     return State(seed=header["seed"], best_generation=header["best_generation"], **arrays)
 
 
-def _layout(codons: int, n_arrivals: int) -> dict[str, np.dtype[Any]]:
+def _layout(codons: int, n_arrivals: int, n_times: int) -> dict[str, np.dtype[Any]]:
     """Return what a row of each array is, in the order they are written."""
-    score = score_type(n_arrivals)
+    score = score_type(n_arrivals, n_times)
     return {
         "genomes": np.dtype(("u1", (codons,))),
         "scores": score,
         "best_genome": np.dtype("u1"),
         "best_score": score,
+        "contenders": np.dtype(("u1", (codons,))),
+        "contender_scores": score,
+        "contender_generations": np.dtype("<i8"),
         "history": HISTORY,
         "digests": np.dtype(("u1", (DIGEST_BYTES,))),
         "cached": score,

@@ -14,7 +14,6 @@ from gecar.errors import expected, first_fault
 from gecar.files import is_file, read_toml
 from gecar.language.mapping import MappingOptions
 from gecar.search.executors import MAX_WORKERS, usable_cores
-from gecar.search.robust import Summary
 from gecar.search.settings import Settings, preset
 from gecar.world.rollout import STEP_S
 
@@ -41,9 +40,6 @@ class Config(BaseModel):
         As in `gecar.world.rollout.World`.
     noise, motor_noise
         Noise of each sensor reading [%], and of each command's strength [% of it].
-    robust, robust_by
-        How many perturbed robots a program must bring to GOAL beside the nominal one, and whether its fitness is the
-        mean or the worst time of all.
     wraps, single_choice_consumes, max_symbols
         As in `gecar.language.mapping.MappingOptions`.
     search
@@ -65,8 +61,6 @@ class Config(BaseModel):
     engine: Literal["auto", "inline", "pymunk"] = "auto"
     noise: Share = 0.0
     motor_noise: Share = 0.0
-    robust: int = Field(0, ge=0, le=1_000)
-    robust_by: Summary = "mean"
     wraps: int = Field(MappingOptions.wraps, ge=0, le=1_000_000)
     single_choice_consumes: bool = MappingOptions.single_choice_consumes
     max_symbols: int = Field(MappingOptions.max_symbols, ge=1, le=10_000_000)

@@ -10,11 +10,12 @@ from concurrent.futures import Future
 from typing import Any
 
 from gecar.results.config import Config
+from gecar.results.folder import outcome_of
 from gecar.results.provenance import versions
-from gecar.results.running import load_task, verified_on_pymunk
+from gecar.results.running import choose, load_task, measured
 from gecar.results.study import Planned, StudyFolder
 from gecar.search.batches import Batches
-from gecar.search.evolution import Evolution, run
+from gecar.search.evolution import run
 from gecar.search.history import Generation
 from gecar.search.workplace import Workplace, perform_each
 
@@ -31,33 +32,16 @@ def perform(config: Config) -> dict[str, Any]:
     evolution = task.evolution()
     with Batches(task.evaluator) as batches:
         run(evolution, batches)
+    choose(task, evolution)
     return {
         **outcome_of(evolution),
-        "verified_on_pymunk": verified_on_pymunk(task, evolution),
+        **measured(task, evolution),
         "configuration": task.configuration,
         "versions": versions(),
         "config": config.identity,
         "history": dict(
             zip(Generation._fields, map(list, zip(*evolution.history, strict=True)), strict=True)
         ),
-    }
-
-
-def outcome_of(evolution: Evolution) -> dict[str, Any]:
-    """Return what a finished evolution came to."""
-    best, last = evolution.best, evolution.history[-1]
-    return {
-        "fitness_s": best.fitness_s,
-        "solved": best.solved,
-        "program": str(best.program or ""),
-        "found_in_generation": best.generation,
-        "generations": evolution.generation,
-        "evaluations": last.evaluations,
-        "distinct_evaluations": last.simulated,
-        "simulated_steps": last.steps,
-        "wall_s": round(last.wall_s, 3),
-        "seed": evolution.seed,
-        "genome": best.genome.tolist(),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -13,17 +14,20 @@ from typing import Any
 from gecar.errors import InputError, expected
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
+from gecar.language.opcodes import MAX_DUTY_PCT
+from gecar.language.program import Program
 from gecar.language.robot_language import check_robot_language
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
 from gecar.results.folder import RunFolder, check_new
 from gecar.results.provenance import fingerprints, versions
 from gecar.results.saving import Saver
 from gecar.search.batches import Batches
+from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals, chosen, times_at_steps
 from gecar.search.evaluation import DriveEvaluator
 from gecar.search.evolution import Evolution, noise_seed, rehearse, run
 from gecar.search.executors import open_executor, side_by_side
 from gecar.search.history import Generation
-from gecar.search.robust import RobustEvaluator
+from gecar.search.state import State
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
@@ -49,17 +53,25 @@ class Task:
         return self.config.executor, self.config.workers, self.config.scheduler
 
     @property
-    def evaluator(self) -> DriveEvaluator | RobustEvaluator:
+    def evaluator(self) -> DriveEvaluator:
         """What scores programs."""
-        config = self.config
-        if config.robust > 0:
-            arrivals = config.search.needs_arrivals
-            return RobustEvaluator(self.world, config.robust, config.robust_by, config.seed, arrivals)
-        return DriveEvaluator(self.world, self.config.search.needs_arrivals)
+        search = self.config.search
+        return DriveEvaluator(
+            self.world, search.needs_arrivals, search.draws, search.arrival_share, self.config.seed
+        )
 
-    def evolution(self) -> Evolution:
-        """Return a new evolution."""
-        return Evolution(self.config.search, self.mapper, self.config.seed, self.evaluator.n_arrivals)
+    @property
+    def duty_cap_pct(self) -> int:
+        """Duty beyond which commands do the same [%]; with noise on it a command beyond the cap is another."""
+        cap = MAX_DUTY_PCT if self.world.noise != Noise() else 100.0 * self.world.robot.drive.duty_cap
+        return math.ceil(cap - 1e-9)
+
+    def evolution(self, state: State | None = None) -> Evolution:
+        """Return an evolution, new or from a state on."""
+        search, arrivals = self.config.search, self.evaluator.n_arrivals
+        if state is None:
+            return Evolution(search, self.mapper, self.config.seed, arrivals, self.duty_cap_pct)
+        return Evolution.resume(search, self.mapper, state, arrivals, self.duty_cap_pct)
 
 
 def load_task(config: Config) -> Task:
@@ -129,10 +141,7 @@ def resume(out: Path, changes: Mapping[str, Any] | None = None) -> Started:
     _check_unchanged(table, task, place)
     folder.sweep()
     state = folder.load(task.configuration)
-    evolution = task.evolution()
-    if state is not None:
-        evolution = Evolution.resume(wanted.search, task.mapper, state, task.evaluator.n_arrivals)
-    return Started(task, folder, evolution)
+    return Started(task, folder, task.evolution(state))
 
 
 def _check_unchanged(table: Mapping[str, Any], task: Task, place: Path) -> None:
@@ -193,8 +202,9 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
             saver.save()
         raise
     saver.save()
+    choose(task, evolution)
     folder.write_reports(evolution)
-    return folder.write_result(evolution, {"verified_on_pymunk": verified_on_pymunk(task, evolution)})
+    return folder.write_result(evolution, measured(task, evolution))
 
 
 def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) -> None:
@@ -203,6 +213,36 @@ def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) 
         rehearse(config.search, task.mapper)
         batches.warm()
         run(evolution, batches, after)
+
+
+def choose(task: Task, evolution: Evolution) -> None:
+    """Choose the best of the best on fresh draws, where programs are judged by more than the nominal drive."""
+    search, contenders = task.config.search, evolution.contenders
+    programs = [contender.program.opcodes for contender in contenders if contender.program is not None]
+    if search.draws > 1 and len(programs) > 1:
+        evolution.choose(contenders[chosen(task.world, programs, search.arrival_share, evolution.seed)])
+
+
+def measured(task: Task, evolution: Evolution) -> dict[str, Any]:
+    """Return what is measured of the best program at the end: whether pymunk agrees, and how it arrives elsewhere."""
+    return {
+        "verified_on_pymunk": verified_on_pymunk(task, evolution),
+        "arrives": arrives(task.world, evolution.best.program, evolution.seed),
+    }
+
+
+def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
+    """Return how a program arrives under `REPORTED_DRAWS` fresh conditions, and at other steps, for result.json."""
+    if program is None:
+        return {"share": 0.0, "of": 0, "median_s": None, "p95_s": None, "steps": {}}
+    (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT))
+    return {
+        "share": times.share,
+        "of": REPORTED_DRAWS,
+        "median_s": times.quantile_s(0.5),
+        "p95_s": times.quantile_s(0.95),
+        "steps": times_at_steps(world, program.opcodes, noise_seed(seed, program)),
+    }
 
 
 def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:

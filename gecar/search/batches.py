@@ -162,6 +162,8 @@ class Batches:
 
 
 def _batch(candidates: Sequence[Candidate]) -> Batch:
-    """Pack candidates; those of one generation have the same fitness to beat."""
-    to_beat_s = candidates[0].to_beat_s if candidates else math.inf
-    return Batch([c.program.opcodes for c in candidates], [c.seed for c in candidates], to_beat_s)
+    """Pack candidates; those of one generation have the same merit to beat."""
+    to_beat_s, generation = (
+        (candidates[0].to_beat_s, candidates[0].generation) if candidates else (math.inf, 0)
+    )
+    return Batch([c.program.opcodes for c in candidates], [c.seed for c in candidates], to_beat_s, generation)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.language.mapping import Mapper
+from gecar.language.opcodes import MAX_DUTY_PCT
 from gecar.search.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.search.fitness import Scores, merit
 from gecar.search.initialisation import initialise
@@ -63,12 +64,20 @@ class Breeder:
         What genomes derive.
     seed
         The run's.
+    duty_cap_pct
+        As for `gecar.search.evolution.Evolution`.
     """
 
-    def __init__(self, settings: Settings, mapper: Mapper, seed: int) -> None:
+    def __init__(
+        self, settings: Settings, mapper: Mapper, seed: int, duty_cap_pct: int = MAX_DUTY_PCT
+    ) -> None:
         self.settings, self.mapper, self.seed = settings, mapper, seed
-        self._phenotypes = Phenotypes(mapper)
+        self._phenotypes = Phenotypes(mapper, duty_cap_pct)
         self._operators = _operators(settings)
+
+    def read(self, genomes: Bytes) -> list[Phenotype | None]:
+        """Return what genomes derive."""
+        return self._phenotypes.read(genomes)
 
     def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred:
         """Return a first population: that of generation 0, or of a later one that begins anew."""

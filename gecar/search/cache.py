@@ -19,12 +19,12 @@ class ScoreCache:
 
     Parameters
     ----------
-    n_arrivals
+    n_arrivals, n_times
         As in `gecar.search.fitness.score_type`.
     """
 
-    def __init__(self, n_arrivals: int = 0) -> None:
-        self._scores = np.zeros(CAPACITY, score_type(n_arrivals))
+    def __init__(self, n_arrivals: int = 0, n_times: int = 0) -> None:
+        self._scores = np.zeros(CAPACITY, score_type(n_arrivals, n_times))
         self._digests: list[bytes] = []
         self._rows: dict[bytes, int] = {}
         self._next = 0
@@ -40,8 +40,11 @@ class ScoreCache:
         return self._scores[[self._rows[digest] for digest in digests]]
 
     def add(self, digests: Sequence[bytes], scores: Scores) -> None:
-        """Keep the scores of programs that are not known yet."""
+        """Keep the scores of programs; of those known already, the new ones."""
         for digest, score in zip(digests, scores, strict=True):
+            if digest in self._rows:
+                self._scores[self._rows[digest]] = score
+                continue
             if len(self._digests) < CAPACITY:
                 self._digests.append(digest)
             else:

@@ -15,19 +15,25 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.search.chance import FIRST_DRAWS, MARGIN, ROUNDS, pool
 from gecar.search.fitness import UNSOLVED, Scores, score_type
-from gecar.world.rollout import Drive, Driver, Outcome, World
+from gecar.world.conditions import Conditions
+from gecar.world.perturbation import drawn_conditions
+from gecar.world.rollout import Fleet, Outcome, World
 
 Opcodes = npt.NDArray[np.int32]
-Evaluator = Callable[[Sequence[Opcodes], Sequence[int], float], Scores]
-"""What scores programs: opcodes, a seed of the noise for each, and the best fitness so far [s]; programs far behind
-that may be scored roughly. It must pickle, and always give a program the same score with the same seed and the same
-fitness to beat, whichever other programs stand beside it."""
+Evaluator = Callable[[Sequence[Opcodes], Sequence[int], float, int], Scores]
+"""What scores programs: opcodes, a seed of the noise for each, the best merit so far [s] (programs far behind that may
+be scored roughly), and the generation, whose conditions are drawn for it. It must pickle, and always give a program the
+same score with the same seed, merit to beat and generation, whichever other programs stand beside it."""
 
 
 @dataclass(frozen=True)
 class DriveEvaluator:
-    """Scores a program by one drive over a course, eq. 1.
+    """Scores programs by driving them: once, eq. 1; and under drawn conditions, if there are to be any.
+
+    Racing: what misses GOAL in the nominal drive ends there. The others meet `FIRST_DRAWS` drawn conditions; what still
+    may arrive often enough, and is not `MARGIN` behind the best, meets the rest. So a bad program costs one drive.
 
     Attributes
     ----------
@@ -35,27 +41,33 @@ class DriveEvaluator:
         Robot and course.
     keep_arrivals
         Whether scores hold the arrival times at all checkpoints.
+    draws
+        Drives a program is judged by, the nominal one included.
+    required_share
+        Share of arrivals it needs.
+    seed
+        Where the conditions come from.
     """
 
     world: World
     keep_arrivals: bool = False
+    draws: int = 1
+    required_share: float = 0.95
+    seed: int = 0
 
     def __call__(
         self,
         programs: Sequence[Opcodes],
         seeds: Sequence[int],
-        to_beat_s: float = math.inf,  # noqa: ARG002  one drive is never broken off
+        to_beat_s: float = math.inf,
+        generation: int = 0,
     ) -> Scores:
         """Return a score for each program, dtype `score_type`."""
-        scores = np.zeros(len(programs), score_type(self.n_arrivals))
-        for i, (opcodes, seed) in enumerate(zip(programs, seeds, strict=True)):
-            drive = self._driver.simulate(opcodes, seed)
-            solved = drive.outcome == Outcome.GOAL
-            fitness = drive.time_s if solved else UNSOLVED
-            arrival = drive.arrival_s if self.keep_arrivals else ()
-            scores[i] = (
-                fitness, self._share(drive), drive.outcome, drive.checkpoints, drive.time_s, drive.steps, arrival,
-            )  # fmt: skip
+        scores = self._nominal(programs, seeds)
+        if self.draws > 1:
+            self._race(scores, programs, seeds, to_beat_s, generation)
+            for score in scores:
+                pool(score, self.required_share)
         return scores
 
     @property
@@ -63,22 +75,79 @@ class DriveEvaluator:
         """How many arrival times a score holds."""
         return len(self.world.course.sequence) if self.keep_arrivals else 0
 
-    @cached_property
-    def _driver(self) -> Driver:
-        return Driver(self.world)
+    def _nominal(self, programs: Sequence[Opcodes], seeds: Sequence[int]) -> Scores:
+        scores = np.zeros(len(programs), score_type(self.n_arrivals, n_times(self.draws)))
+        pairs = np.stack([np.arange(len(programs)), np.zeros(len(programs))], axis=1)
+        summary, arrival = self._fleet.drive(programs, self._world_says, pairs, seeds)
+        for field in ("outcome", "checkpoints", "time_s", "steps"):
+            scores[field] = summary[field]
+        solved = summary["outcome"] == Outcome.GOAL
+        scores["fitness_s"] = scores["merit_s"] = np.where(solved, summary["time_s"], UNSOLVED)
+        scores["share"] = self._shares(arrival)
+        scores["arrival_s"] = arrival[:, : self.n_arrivals]
+        scores["drawn_s"] = np.nan
+        return scores
 
-    def _share(self, drive: Drive) -> float:
-        """How far along the course a drive came: tiles in order, and among equals who was there sooner, 0..1."""
-        passed = int(np.count_nonzero(~np.isnan(drive.arrival_s)))
-        if passed == 0:
-            return 0.0
-        sooner = 1.0 - float(drive.arrival_s[passed - 1]) / self.world.time_limit_s
-        return (passed - 1 + max(sooner, 0.0)) / len(drive.arrival_s)
+    def _race(
+        self,
+        scores: Scores,
+        programs: Sequence[Opcodes],
+        seeds: Sequence[int],
+        to_beat_s: float,
+        generation: int,
+    ) -> None:
+        """Drive what may still be good under the generation's conditions, in two stages."""
+        under = drawn_conditions(self.world, self.draws - 1, (self.seed, generation))
+        first = min(FIRST_DRAWS, self.draws - 1)
+        allowed = math.floor((1.0 - self.required_share) * self.draws + 1e-9)
+        for begin, end in ((0, first), (first, self.draws - 1)):
+            times = scores["drawn_s"][:, :begin]
+            missed = np.isinf(times).sum(axis=1)
+            behind = np.array(
+                [np.median([s["fitness_s"], *s["drawn_s"][:begin]]) > MARGIN * to_beat_s for s in scores]
+            )
+            left = np.flatnonzero(
+                (scores["fitness_s"] < UNSOLVED) & (missed <= allowed) & ~(behind & (begin > 0))
+            )
+            if end <= begin or len(left) == 0:
+                return
+            k, row = (axis.ravel() for axis in np.meshgrid(left, np.arange(begin, end), indexing="ij"))
+            drive_number = generation * self.draws + row + 1
+            streams = np.array(seeds, np.uint64)[k] + drive_number.astype(np.uint64) * _NEXT_STREAM
+            summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
+            at_goal = summary["outcome"] == Outcome.GOAL
+            scores["drawn_s"][k, row] = np.where(at_goal, summary["time_s"], np.inf)
+            np.add.at(scores["steps"], k, summary["steps"])
+
+    def _shares(self, arrival: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """How far along the course drives came: tiles in order, and among equals who was there sooner, 0..1."""
+        reached = ~np.isnan(arrival)
+        passed = reached.sum(axis=1)
+        latest = np.where(reached, arrival, 0.0).max(axis=1, initial=0.0)
+        sooner = np.maximum(1.0 - latest / self.world.time_limit_s, 0.0)
+        shares: npt.NDArray[np.float64] = np.where(passed > 0, (passed - 1 + sooner) / arrival.shape[1], 0.0)
+        return shares
+
+    @cached_property
+    def _fleet(self) -> Fleet:
+        return Fleet(self.world)
+
+    @cached_property
+    def _world_says(self) -> Conditions:
+        return self.world.nominal
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle without what can be made again: a course without its raster is 2 kB instead of 3 MB."""
         bare = replace(self.world, course=replace(self.world.course))
-        return DriveEvaluator, (bare, self.keep_arrivals)
+        return DriveEvaluator, (bare, self.keep_arrivals, self.draws, self.required_share, self.seed)
+
+
+_NEXT_STREAM = np.uint64(0x9E3779B97F4A7C15)
+
+
+def n_times(draws: int) -> int:
+    """Return how many times under drawn conditions scores hold, where each generation adds ``draws`` - 1."""
+    return ROUNDS * (draws - 1)
 
 
 class Recipe(NamedTuple):
@@ -121,6 +190,7 @@ class Batch(NamedTuple):
     programs: Sequence[Opcodes]
     seeds: Sequence[int]
     to_beat_s: float = math.inf
+    generation: int = 0
 
 
 def score_batch(packed: Recipe, batch: Batch) -> Scored:

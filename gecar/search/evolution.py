@@ -19,16 +19,21 @@ import numpy.typing as npt
 
 from gecar.errors import expected
 from gecar.language.mapping import Mapper
+from gecar.language.opcodes import MAX_DUTY_PCT
 from gecar.language.program import Program
 from gecar.search.breeding import Bred, Breeder
 from gecar.search.cache import ScoreCache
-from gecar.search.fitness import Scores, as_scores, invalid_scores, merit
+from gecar.search.chance import add_drives, wants_more
+from gecar.search.evaluation import n_times
+from gecar.search.fitness import UNSOLVED, Scores, as_scores, invalid_scores, merit
 from gecar.search.history import HISTORY, Generation, Patience, Totals, summary
 from gecar.search.lineage import Ledger
 from gecar.search.settings import Settings
 from gecar.search.state import Best, Candidate, State
 
 Bytes = npt.NDArray[np.uint8]
+CONTENDERS = 40
+"""Best programs kept, to choose from at the end."""
 
 
 class Evolution:
@@ -44,6 +49,8 @@ class Evolution:
         Where all randomness comes from; equal seeds, equal runs.
     n_arrivals
         How many arrival times scores hold, for ``lexicase``.
+    duty_cap_pct
+        Duty beyond which commands do the same [%]: programs that differ only there are one program.
 
     Raises
     ------
@@ -51,18 +58,27 @@ class Evolution:
         If the seed is no whole number from 0 up, or lexicase has no arrival times.
     """
 
-    def __init__(self, settings: Settings, mapper: Mapper, seed: int = 1, n_arrivals: int = 0) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        mapper: Mapper,
+        seed: int = 1,
+        n_arrivals: int = 0,
+        duty_cap_pct: int = MAX_DUTY_PCT,
+    ) -> None:
         if not 0 <= seed < 2**64:
             raise expected("seed", seed, "a whole number from 0 to 2^64 - 1")
         if settings.needs_arrivals and n_arrivals == 0:
             raise expected("n_arrivals", 0, "the number of checkpoints and GOAL, for lexicase selection")
         self.settings, self.mapper, self.seed, self.n_arrivals = settings, mapper, seed, n_arrivals
+        self.n_times = n_times(settings.draws)
         self.history: list[Generation] = []
         self.genomes: Bytes = np.zeros((0, settings.codons), np.uint8)
-        self.scores: Scores = invalid_scores(0, n_arrivals)
+        self.scores: Scores = invalid_scores(0, n_arrivals, self.n_times)
         self._best: Best | None = None
-        self._cache = ScoreCache(n_arrivals)
-        self._breeder = Breeder(settings, mapper, seed)
+        self._contenders: dict[bytes, Best] = {}
+        self._cache = ScoreCache(n_arrivals, self.n_times)
+        self._breeder = Breeder(settings, mapper, seed, duty_cap_pct)
         self._bred: Bred | None = None
         self._parents = np.zeros((0, 2), np.int32)
         self._ledger = Ledger()
@@ -72,9 +88,16 @@ class Evolution:
         self._earlier_s = 0.0
 
     @classmethod
-    def resume(cls, settings: Settings, mapper: Mapper, state: State, n_arrivals: int = 0) -> Evolution:
+    def resume(
+        cls,
+        settings: Settings,
+        mapper: Mapper,
+        state: State,
+        n_arrivals: int = 0,
+        duty_cap_pct: int = MAX_DUTY_PCT,
+    ) -> Evolution:
         """Go on from a state, to the same end as if there had been no break."""
-        evolution = cls(settings, mapper, state.seed, n_arrivals)
+        evolution = cls(settings, mapper, state.seed, n_arrivals, duty_cap_pct)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
         for generation in evolution.history:
             evolution._patience.see(generation.best)
@@ -84,6 +107,17 @@ class Evolution:
         evolution._cache.add([row.tobytes() for row in state.digests], state.cached)
         program = mapper.map(state.best_genome[None]).program(0)
         evolution._best = Best(state.best_genome, state.best_score, state.best_generation, program)
+        found = zip(
+            state.contenders, state.contender_scores, state.contender_generations.tolist(), strict=True
+        )
+        for phenotype, (genome, score, generation) in zip(
+            evolution._breeder.read(state.contenders), found, strict=True
+        ):
+            if phenotype is not None:
+                best = Best(
+                    genome.copy(), np.array([score], state.scores.dtype), generation, phenotype.program
+                )
+                evolution._contenders[phenotype.digest] = best
         return evolution
 
     def state(self) -> State:
@@ -105,6 +139,7 @@ class Evolution:
             best.genome,
             best.score,
             best.generation,
+            *self._dump_contenders(),
             history,
             digests,
             cached,
@@ -141,6 +176,16 @@ class Evolution:
         return self._best
 
     @property
+    def contenders(self) -> list[Best]:
+        """The best programs so far by merit, the best first; without drawn conditions that is the best alone."""
+        ranked = sorted(self._contenders.values(), key=lambda contender: _rank(contender.score[0]))
+        return ranked or [self.best]
+
+    def choose(self, contender: Best) -> None:
+        """Make a contender the best: what looked best may have been lucky, as fresh draws show."""
+        self._best = contender
+
+    @property
     def parents(self) -> npt.NDArray[np.int32]:
         """Whom the individuals asked for, or told of last, come from; see `gecar.search.breeding.Bred`."""
         return self._parents
@@ -148,7 +193,8 @@ class Evolution:
     def ask(self) -> list[Candidate]:
         """Breed the next generation and return the programs in it that have no score yet, each once.
 
-        There may be none; `tell` them all the same.
+        With drawn conditions, also those that have arrived often enough so far, to be driven under fresh ones. There
+        may be none; `tell` them all the same.
 
         Raises
         ------
@@ -165,11 +211,12 @@ class Evolution:
         programs: dict[bytes, Program] = {}
         self._asked = {}
         for i, phenotype in enumerate(self._bred.phenotypes):
-            if phenotype is not None and phenotype.digest not in self._cache:
+            if phenotype is not None and self._wants_drives(phenotype.digest):
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
-        to_beat_s = math.inf if self._best is None else self._best.fitness_s
-        return [Candidate(p, noise_seed(self.seed, p), to_beat_s) for p in programs.values()]
+        to_beat_s = math.inf if self._best is None else self._best.merit_s
+        generation = len(self.history)
+        return [Candidate(p, noise_seed(self.seed, p), to_beat_s, generation) for p in programs.values()]
 
     def tell(self, results: Any) -> Generation:
         """Take the scores of the programs asked for.
@@ -192,7 +239,7 @@ class Evolution:
         """
         if self._bred is None:
             raise expected("tell", "no generation that waits for scores", "ask first")
-        told = as_scores(results, len(self._asked), self.n_arrivals)
+        told = self._pooled(as_scores(results, len(self._asked), self.n_arrivals, self.n_times))
         bred, scores = self._bred, self._score(self._bred, told)
         self._cache.add(list(self._asked), told)
         self.genomes, self.scores, self._bred = bred.genomes, scores, None
@@ -200,6 +247,21 @@ class Evolution:
         keys = [b"" if phenotype is None else phenotype.key for phenotype in bred.phenotypes]
         self._ledger.add(bred.parents, bred.changed, merit(scores, checkpoint_credit=True), keys)
         return self.history[-1]
+
+    def _wants_drives(self, digest: bytes) -> bool:
+        if digest not in self._cache:
+            return True
+        return self.n_times > 0 and wants_more(self._cache.look_up([digest])[0])
+
+    def _pooled(self, told: Scores) -> Scores:
+        """Add to what is known of programs what was driven now."""
+        if self.n_times > 0:
+            for k, digest in enumerate(self._asked):
+                if digest in self._cache:
+                    known = self._cache.look_up([digest])
+                    add_drives(known[0], told[k], self.settings.arrival_share)
+                    told[k] = known[0]
+        return told
 
     def _breed(self) -> Bred:
         generation, known = len(self.history), self._cache.__contains__
@@ -209,7 +271,7 @@ class Evolution:
 
     def _score(self, bred: Bred, told: Scores) -> Scores:
         """Put together the population's scores: invalid, known before, or told now."""
-        scores = invalid_scores(len(bred.genomes), self.n_arrivals)
+        scores = invalid_scores(len(bred.genomes), self.n_arrivals, self.n_times)
         digests = {i: p.digest for i, p in enumerate(bred.phenotypes) if p is not None}
         known = [i for i, digest in digests.items() if digest not in self._asked]
         scores[known] = self._cache.look_up([digests[i] for i in known])
@@ -226,12 +288,34 @@ class Evolution:
         programs = len({phenotype.digest for phenotype in bred.phenotypes if phenotype is not None})
         self.history.append(summary(len(self.history), self.scores, programs, totals, self._wall_s()))
         self._patience.see(self.history[-1].best)
-        fittest = int(np.lexsort((-self.scores["share"], self.scores["fitness_s"]))[0])
+        if self.n_times > 0:
+            self._keep_contenders(bred)
+        fittest = int(np.lexsort((-self.scores["share"], self.scores["merit_s"]))[0])
         if self._best is None or _rank(self.scores[fittest]) < _rank(self._best.score[0]):
             phenotype = bred.phenotypes[fittest]
             program = None if phenotype is None else phenotype.program
             score = self.scores[fittest : fittest + 1].copy()
             self._best = Best(bred.genomes[fittest].copy(), score, self.generation, program)
+
+    def _keep_contenders(self, bred: Bred) -> None:
+        """Keep the best programs so far, with what is known of them now."""
+        for i, phenotype in enumerate(bred.phenotypes):
+            if phenotype is not None and self.scores["merit_s"][i] < UNSOLVED:
+                known = self._contenders.get(phenotype.digest)
+                generation = known.generation if known else self.generation
+                score = self.scores[i : i + 1].copy()
+                genome = bred.genomes[i].copy()
+                self._contenders[phenotype.digest] = Best(genome, score, generation, phenotype.program)
+            elif phenotype is not None:
+                self._contenders.pop(phenotype.digest, None)
+        ranked = sorted(self._contenders, key=lambda digest: _rank(self._contenders[digest].score[0]))
+        self._contenders = {digest: self._contenders[digest] for digest in ranked[:CONTENDERS]}
+
+    def _dump_contenders(self) -> tuple[Bytes, Scores, npt.NDArray[np.int64]]:
+        kept = list(self._contenders.values())
+        genomes = np.array([one.genome for one in kept], np.uint8).reshape(-1, self.settings.codons)
+        scores = np.concatenate([self.scores[:0], *(one.score for one in kept)])
+        return genomes, scores, np.array([one.generation for one in kept], np.int64)
 
     def _wall_s(self) -> float:
         return self._earlier_s + (0.0 if self._began is None else time.perf_counter() - self._began)
@@ -265,12 +349,12 @@ def run(
 def rehearse(settings: Settings, mapper: Mapper) -> None:
     """Run two small generations that score nothing, so that all compiled code is there before the clock runs."""
     small = settings.model_copy(update={"population": settings.elites + 4, "generations": 1})
-    n_arrivals = 2 if settings.needs_arrivals else 0
-    run(Evolution(small, mapper, 0, n_arrivals), lambda asked: invalid_scores(len(asked), n_arrivals))
+    sizes = 2 if settings.needs_arrivals else 0, n_times(settings.draws)
+    run(Evolution(small, mapper, 0, sizes[0]), lambda asked: invalid_scores(len(asked), *sizes))
 
 
 def _rank(score: Any) -> tuple[float, float]:
-    return float(score["fitness_s"]), -float(score["share"])
+    return float(score["merit_s"]), -float(score["share"])
 
 
 def noise_seed(seed: int, program: Program) -> int:

@@ -18,45 +18,51 @@ Scores = npt.NDArray[np.void]
 Floats = npt.NDArray[np.float64]
 
 
-def score_type(n_arrivals: int = 0) -> np.dtype[np.void]:
+def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
     """Return the dtype of scores.
 
     Parameters
     ----------
     n_arrivals
         How many tiles' arrival times to keep; 0 unless selection wants them.
+    n_times
+        How many drives under drawn conditions to keep the times of.
 
     Returns
     -------
     numpy.dtype
-        ``fitness_s``: eq. 1 [s]. ``share``: how far along the course it came, 0..1, for selection only.
-        ``outcome``, ``checkpoints``, ``time_s``, ``steps``: of the drive. ``arrival_s``: when each tile of the
-        course's sequence was reached [s], nan where it was not.
+        ``fitness_s``: eq. 1 [s]. ``merit_s``: what selection goes by; eq. 1, or its quantile under drawn conditions
+        (`gecar.search.chance`). ``share``: how far along the course it came, 0..1, for selection only.
+        ``outcome``, ``checkpoints``, ``time_s``, ``steps``: of the nominal drive; steps of all. ``arrival_s``: when
+        each tile of the course's sequence was reached [s], nan where it was not. ``drawn_s``: times to GOAL under drawn
+        conditions [s], inf where it was missed, nan where nothing was driven.
     """
     return np.dtype(
         [
             ("fitness_s", "<f8"),
+            ("merit_s", "<f8"),
             ("share", "<f8"),
             ("outcome", "<i1"),
             ("checkpoints", "<i4"),
             ("time_s", "<f8"),
             ("steps", "<i8"),
             ("arrival_s", "<f8", (n_arrivals,)),
+            ("drawn_s", "<f4", (n_times,)),
         ]
     )
 
 
-def invalid_scores(n: int, n_arrivals: int = 0) -> Scores:
+def invalid_scores(n: int, n_arrivals: int = 0, n_times: int = 0) -> Scores:
     """Return the scores of n genomes that map to no program."""
-    scores = np.zeros(n, score_type(n_arrivals))
-    scores["fitness_s"] = UNSOLVED
+    scores = np.zeros(n, score_type(n_arrivals, n_times))
+    scores["fitness_s"] = scores["merit_s"] = UNSOLVED
     scores["share"] = -1.0
     scores["outcome"] = INVALID
-    scores["arrival_s"] = np.nan
+    scores["arrival_s"] = scores["drawn_s"] = np.nan
     return scores
 
 
-def as_scores(results: Any, n: int, n_arrivals: int) -> Scores:
+def as_scores(results: Any, n: int, n_arrivals: int, n_times: int = 0) -> Scores:
     """Check what an evaluation returned.
 
     Parameters
@@ -65,7 +71,7 @@ def as_scores(results: Any, n: int, n_arrivals: int) -> Scores:
         Scores (n,), or only their fitness [s] as numbers.
     n
         How many were asked for.
-    n_arrivals
+    n_arrivals, n_times
         As in `score_type`.
 
     Raises
@@ -73,10 +79,10 @@ def as_scores(results: Any, n: int, n_arrivals: int) -> Scores:
     InputError
         If there are more or fewer, or one has no fitness.
     """
-    wanted = score_type(n_arrivals)
+    wanted = score_type(n_arrivals, n_times)
     given = np.asarray(results)
     if given.dtype != wanted:
-        given = _from_fitness(given, n_arrivals)
+        given = _from_fitness(given, wanted)
     if given.shape != (n,):
         raise expected(
             "tell", f"scores of shape {given.shape}", f"one score for each of the {n} programs asked for"
@@ -86,15 +92,14 @@ def as_scores(results: Any, n: int, n_arrivals: int) -> Scores:
     return given
 
 
-def _from_fitness(given: npt.NDArray[Any], n_arrivals: int) -> Scores:
+def _from_fitness(given: npt.NDArray[Any], wanted: np.dtype[np.void]) -> Scores:
     """Make scores of fitness alone; the course was then passed or not."""
-    if given.dtype.kind not in "iuf" or n_arrivals:
-        raise expected(
-            "tell", f"results of dtype {given.dtype}", f"numbers, or scores of dtype {score_type(n_arrivals)}"
-        )
-    scores = np.zeros(given.shape, score_type())
-    scores["fitness_s"] = given
+    if given.dtype.kind not in "iuf" or wanted["arrival_s"].shape[0]:
+        raise expected("tell", f"results of dtype {given.dtype}", f"numbers, or scores of dtype {wanted}")
+    scores = np.zeros(given.shape, wanted)
+    scores["fitness_s"] = scores["merit_s"] = given
     scores["share"] = given < UNSOLVED
+    scores["drawn_s"] = np.nan
     return scores
 
 
@@ -109,7 +114,7 @@ def merit(scores: Scores, checkpoint_credit: bool) -> Floats:
         Whether the cliff of eq. 1 slopes: unsolved individuals then lie between 10^4 and 10^4 + 2, those that
         came farther below the others. Fitness as reported stays eq. 1.
     """
-    fitness: Floats = scores["fitness_s"]
+    merits: Floats = scores["merit_s"]
     if not checkpoint_credit:
-        return fitness
-    return np.where(fitness < UNSOLVED, fitness, UNSOLVED + 1.0 - scores["share"])
+        return merits
+    return np.where(merits < UNSOLVED, merits, UNSOLVED + 1.0 - scores["share"])

@@ -19,7 +19,8 @@ class Generation(NamedTuple):
     generation
         0 is the first population.
     best, mean
-        Fitness of eq. 1 over the population [s]; 10^4 is a program that fails.
+        Fitness of eq. 1 over the population [s], or with drawn conditions the median time to GOAL of what arrives often
+        enough; 10^4 is a program that fails.
     valid, distinct
         Shares of the population that map to a program, and of different programs in it.
     evaluations
@@ -27,7 +28,7 @@ class Generation(NamedTuple):
     wall_s
         Time since the run began, interruptions apart [s].
     solved
-        Share of the population that reaches GOAL.
+        Share of the population that reaches GOAL, often enough where there are drawn conditions.
     mean_solved
         Their mean time to GOAL [s]; nan where there is none.
     simulated
@@ -80,7 +81,7 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
     wall_s
         Time since the run began [s].
     """
-    fitness = scores["fitness_s"]
+    fitness = scores["merit_s"]
     solved = fitness < UNSOLVED
     return Generation(
         generation=generation,

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.language.mapping import Mapped, Mapper
+from gecar.language.opcodes import LINE, MAX_DUTY_PCT, MOTOR, MOTOR_UNTIL, OP, A, B
 from gecar.language.program import Program
 
 DIGEST_BYTES = 16
@@ -21,11 +22,15 @@ class Phenotype:
 
     program: Program
     key: bytes
+    duty_cap_pct: int = MAX_DUTY_PCT
 
     @cached_property
     def digest(self) -> bytes:
-        """Hash of the opcodes without their line numbers: what programs that do the same have in common."""
-        return hashlib.blake2b(self.program.canonical, digest_size=DIGEST_BYTES).digest()
+        """Hash of what programs that do the same share: opcodes without line numbers, duties cut at the cap."""
+        rows = self.program.opcodes[:, :LINE].copy()
+        drives = (rows[:, OP] == MOTOR) | (rows[:, OP] == MOTOR_UNTIL)
+        rows[drives, A : B + 1] = np.clip(rows[drives, A : B + 1], -self.duty_cap_pct, self.duty_cap_pct)
+        return hashlib.blake2b(rows.tobytes(), digest_size=DIGEST_BYTES).digest()
 
 
 class Phenotypes:
@@ -35,10 +40,12 @@ class Phenotypes:
     ----------
     mapper
         What genomes derive.
+    duty_cap_pct
+        As for `gecar.search.evolution.Evolution`.
     """
 
-    def __init__(self, mapper: Mapper) -> None:
-        self.mapper = mapper
+    def __init__(self, mapper: Mapper, duty_cap_pct: int = MAX_DUTY_PCT) -> None:
+        self.mapper, self.duty_cap_pct = mapper, duty_cap_pct
         self._now: dict[bytes, Phenotype | None] = {}
         self._before: dict[bytes, Phenotype | None] = {}
 
@@ -54,10 +61,9 @@ class Phenotypes:
     def _phenotype(self, mapped: Mapped, i: int) -> Phenotype | None:
         key = mapped.key(i)
         if key not in self._now:
-            self._now[key] = self._before[key] if key in self._before else _read(mapped, i)
+            self._now[key] = self._before[key] if key in self._before else self._read(mapped, i)
         return self._now[key]
 
-
-def _read(mapped: Mapped, i: int) -> Phenotype | None:
-    program = mapped.program(i)
-    return None if program is None else Phenotype(program, mapped.key(i))
+    def _read(self, mapped: Mapped, i: int) -> Phenotype | None:
+        program = mapped.program(i)
+        return None if program is None else Phenotype(program, mapped.key(i), self.duty_cap_pct)

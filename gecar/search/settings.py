@@ -66,6 +66,11 @@ class Settings(BaseModel):
     restart_after
         Generations at GOAL without a faster program, after which a new population begins; the best so far stays
         the run's result. 0: never.
+    draws
+        Drives a program is judged by: the nominal one, and the others under conditions drawn anew every generation
+        (`gecar.search.chance`). 1: eq. 1 alone.
+    arrival_share
+        Share of its drives in which a program has to arrive, where there are several.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -88,6 +93,8 @@ class Settings(BaseModel):
     duplicates: Literal["kept", "generation", "run"] = "kept"
     attempts: int = Field(10, ge=1, le=1_000)
     restart_after: int = Field(0, ge=0, le=1_000_000)
+    draws: int = Field(1, ge=1, le=1_000)
+    arrival_share: Rate = 0.95
 
     @model_validator(mode="after")
     def _fits(self) -> Settings:
@@ -124,6 +131,7 @@ PRESETS = {
         mutation_rate=0.05,
         creep_rate=0.3,
         restart_after=25,
+        draws=16,
     ),
 }
 """Settings by name: the paper's; random search; and what finds faster programs (`benchmarks/better_search.py`).

@@ -16,11 +16,12 @@ Bytes = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A program that wants a score, the seed of the noise it is driven with, and the best fitness so far [s]."""
+    """A program that wants a score, the seed of the noise it is driven with, the best merit so far, the generation."""
 
     program: Program
     seed: int
     to_beat_s: float = math.inf
+    generation: int = 0
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class Best:
         return float(self.score["fitness_s"][0])
 
     @property
+    def merit_s(self) -> float:
+        """What selection goes by [s]."""
+        return float(self.score["merit_s"][0])
+
+    @property
     def solved(self) -> bool:
         """Whether it reaches GOAL."""
         return self.fitness_s < UNSOLVED
@@ -67,6 +73,8 @@ class State:
         The population (population, codons), (population,).
     best_genome, best_score, best_generation
         The best so far (codons,), (1,).
+    contenders, contender_scores, contender_generations
+        The best programs so far, and when each was found (n, codons), (n,), (n,).
     history
         Dtype `gecar.search.history.HISTORY`, shape (generations so far,).
     digests, cached
@@ -81,6 +89,9 @@ class State:
     best_genome: Bytes
     best_score: Scores
     best_generation: int
+    contenders: Bytes
+    contender_scores: Scores
+    contender_generations: npt.NDArray[np.int64]
     history: npt.NDArray[np.void]
     digests: Bytes
     cached: Scores

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 from gecar.world.motor import awake, bare_shaft, effective_duty, motor_current, regulate, slewed, supply
 
 
-@compiled
+@kernel
 def bench_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
     """Advance both shafts by one step; the body stays where it is.
 

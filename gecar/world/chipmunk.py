@@ -19,7 +19,7 @@ from numba import types
 from numba.extending import intrinsic
 from pymunk._chipmunk_cffi import ffi, lib  # the batch functions' addresses are nowhere else
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 
 # Rows of the address table a kernel receives; all zero: no engine, the kernel moves the body itself.
 SPACE, BODY, STEP, READ, WRITE, REQUEST = range(6)
@@ -59,7 +59,7 @@ def _call_pointers(typing: Any, function: Any, first: Any, second: Any) -> Any: 
     return types.void(types.int64, types.int64, types.int64), generate
 
 
-@compiled
+@kernel
 def engine_step(
     s: Any,
     dt: float,

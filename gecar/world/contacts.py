@@ -13,32 +13,43 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gecar.compiled import compiled
-
-SWEEPS = 3
+from gecar.compiled import kernel
 
 
-@compiled
-def solve_contacts(s: Any, c: Any) -> None:
-    """Sweep over shafts, tyres and caster until each has what it asks for or all it can get.
+@kernel
+def release_contacts(s: Any) -> None:
+    """Take all impulses off; sweeps then find those of this step."""
+    s.left_friction = s.right_friction = 0.0
+    s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
+
+
+@kernel
+def sweep(s: Any, c: Any, effects: bool = True) -> bool:
+    """Go once over shafts, tyres and caster, and give each what it asks for or all it can get.
+
+    Three sweeps suffice, and mostly one does.
 
     Parameters
     ----------
     s, c
         Records of dtypes `STATE`, whose speeds and impulses are updated, and `DERIVED`.
+    effects
+        False where the robot has no play and no drag at the caster; see `gecar.world.dynamics.begin_step`.
+
+    Returns
+    -------
+    bool
+        Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
     """
-    s.left_friction = s.right_friction = 0.0
-    s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
-    for _ in range(SWEEPS):
-        settled = _rub_shafts(s, c)
-        sliding = _roll(s, c)
-        if s.caster_circle > 0.0:
-            _drag_caster(s, c)
-        elif settled and not sliding:
-            break  # turning or standing shafts, gripping tyres: one sweep is exact
+    settled = _rub_shafts(s, c)
+    sliding = _roll(s, c, effects)
+    if effects and s.caster_circle > 0.0:
+        _drag_caster(s, c)
+        return False
+    return settled and not sliding
 
 
-@compiled
+@kernel
 def _rub_shafts(s: Any, c: Any) -> bool:
     """Give each shaft the friction impulse that would stop it, within its budget.
 
@@ -59,8 +70,8 @@ def _rub_shafts(s: Any, c: Any) -> bool:
     return settled
 
 
-@compiled
-def _roll(s: Any, c: Any) -> bool:
+@kernel
+def _roll(s: Any, c: Any, effects: bool) -> bool:
     """Give both tyres the impulses that would end their slip, within their friction circles.
 
     Returns
@@ -71,14 +82,15 @@ def _roll(s: Any, c: Any) -> bool:
     left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
     right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
     side_slip = -(s.w + s.yaw_rate * c.axle)
-    end_l = separation(left_slip, s.left_push, s.left_play, c.left_radius, c)
-    end_r = separation(right_slip, s.right_push, s.right_play, c.right_radius, c)
+    plays = effects and c.play > 0.0
+    end_l = separation(left_slip, s.left_push, s.left_play, c.left_radius, c) if plays else left_slip
+    end_r = separation(right_slip, s.right_push, s.right_play, c.right_radius, c) if plays else right_slip
     # As if both slid: each on its own.
     slide_l, slide_ls = s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip
     slide_r, slide_rs = s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip
     left, left_side, right, right_side = slide_l, slide_ls, slide_r, slide_rs
-    free_l = s.left_slides != 0.0 or (c.play > 0.0 and end_l == 0.0)
-    free_r = s.right_slides != 0.0 or (c.play > 0.0 and end_r == 0.0)
+    free_l = s.left_slides != 0.0 or (plays and end_l == 0.0)
+    free_r = s.right_slides != 0.0 or (plays and end_r == 0.0)
     if not free_l and not free_r:
         # Where both hold, they share the side force as they share the load.
         left = s.left_push + (c.m_ll * end_l + c.m_lr * end_r + c.m_ls * side_slip)
@@ -93,16 +105,16 @@ def _roll(s: Any, c: Any) -> bool:
     elif not free_r:
         right = s.right_push + (c.n_rr * end_r + c.n_rs * side_slip)
         right_side = s.right_side + (c.n_rs * end_r + c.n_rss * side_slip)
-    if c.play > 0.0:
+    if plays:
         left, slide_l = _one_way(left, s.left_push, end_l), _one_way(slide_l, s.left_push, end_l)
         right, slide_r = _one_way(right, s.right_push, end_r), _one_way(slide_r, s.right_push, end_r)
     left, left_side, s.left_slides = _within_circle(left, left_side, s.left_circle, slide_l, slide_ls)
     right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
     _push(s, left, right, left_side, right_side, c)
-    return s.left_slides != 0.0 or s.right_slides != 0.0 or c.play > 0.0
+    return s.left_slides != 0.0 or s.right_slides != 0.0 or plays
 
 
-@compiled
+@kernel
 def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
     """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
 
@@ -119,7 +131,7 @@ def separation(slip: float, push: float, play: float, radius: float, c: Any) -> 
     return slip - min(max(slip, low), high)
 
 
-@compiled
+@kernel
 def _one_way(new: float, old: float, end: float) -> float:
     """Keep a gear's push from changing sides within a sweep, and from acting inside the gap."""
     if old > 0.0:
@@ -129,7 +141,7 @@ def _one_way(new: float, old: float, end: float) -> float:
     return new if new * end > 0.0 else 0.0
 
 
-@compiled
+@kernel
 def _within_circle(
     push: float, side: float, circle: float, slide_push: float, slide_side: float
 ) -> tuple[float, float, float]:
@@ -140,7 +152,7 @@ def _within_circle(
     return slide_push * scale, slide_side * scale, 1.0
 
 
-@compiled
+@kernel
 def _push(s: Any, left: float, right: float, left_side: float, right_side: float, c: Any) -> None:
     """Replace the tyres' impulses; what changes acts on body and shafts."""
     more_left = left - s.left_push
@@ -157,7 +169,7 @@ def _push(s: Any, left: float, right: float, left_side: float, right_side: float
     s.right_side = right_side
 
 
-@compiled
+@kernel
 def _drag_caster(s: Any, c: Any) -> None:
     """Give the caster the impulse that would stop it, within its friction circle, against its motion."""
     push = s.caster_push - c.caster_mass * s.u

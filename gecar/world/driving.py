@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import compiled, on_stack
+from gecar.compiled import kernel, on_stack
 from gecar.world.chipmunk import SPACE, engine_step
 from gecar.world.dynamics import drift, step, turn
-from gecar.world.interpreter import Floor, look, run_program, see
+from gecar.world.interpreter import Floor, first_step_after, look, run_program, see
 from gecar.world.sensing import RING, delayed
 from gecar.world.state import place
 
@@ -18,7 +18,7 @@ from gecar.world.state import place
 RUNNING, GOAL, OFF_COURSE, OUT_OF_TIME, STUCK, MISSED_CHECKPOINT = range(6)
 
 
-@compiled
+@kernel
 def advance(
     n: int,
     s: Any,
@@ -49,8 +49,8 @@ def advance(
         drift(s, c)
 
 
-@compiled
-def _tile_at(x: float, y: float, floor: Floor) -> int:
+@kernel
+def tile_at(x: float, y: float, floor: Floor) -> int:
     """Return the index of the tile a point lies on, -1 outside the field."""
     column = int(np.floor(x * floor.per_tile))
     row = int(np.floor(y * floor.per_tile))
@@ -59,8 +59,8 @@ def _tile_at(x: float, y: float, floor: Floor) -> int:
     return row * floor.columns + column
 
 
-@compiled
-def _arrive(
+@kernel
+def arrive(
     tile: int, passed: int, time: float, floor: Floor, arrival: npt.NDArray[np.float64]
 ) -> tuple[int, int]:
     """Return (outcome, tiles of the sequence passed) on entering a tile."""
@@ -75,7 +75,18 @@ def _arrive(
     return RUNNING, passed
 
 
-@compiled
+@kernel
+def begin_program(k: Any, phase_ms: float, dt: float, s: Any, p: Any, floor: Floor) -> None:
+    """Set a program back to its first row, to begin ``phase_ms`` after the start, on the tile the robot stands on."""
+    k.row = k.line = 0
+    k.until = -1
+    k.due_ms = phase_ms
+    k.due_step = first_step_after(phase_ms, dt)
+    k.left_duty = k.right_duty = 0.0
+    k.tile = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+
+
+@kernel
 def _sample(
     trace: npt.NDArray[np.float64], sample: int, time: float, s: Any, k: Any, p: Any, floor: Floor
 ) -> None:
@@ -91,7 +102,7 @@ def _sample(
     trace[sample, 9] = k.line
 
 
-@compiled
+@kernel
 def drive(
     program: npt.NDArray[np.int32],
     physics: npt.NDArray[Any],
@@ -100,6 +111,7 @@ def drive(
     control: npt.NDArray[Any],
     floor: Floor,
     start: npt.NDArray[np.float64],
+    phase_ms: float,
     first: int,
     last: int,
     limit: int,
@@ -122,14 +134,15 @@ def drive(
     """
     s = on_stack(state[0])
     result = _drive(
-        program, physics[0], derived[0], s, control[0], floor, start, first, last, limit, passed, eyes[0],
+        program, physics[0], derived[0], s, control[0], floor, start, phase_ms,
+        first, last, limit, passed, eyes[0],
         commands, engine, buffer, count, arrival, trace, every,
     )  # fmt: skip
     state[0] = s
     return result
 
 
-@compiled
+@kernel
 def _drive(
     program: npt.NDArray[np.int32],
     p: Any,
@@ -138,6 +151,7 @@ def _drive(
     k: Any,
     floor: Floor,
     start: npt.NDArray[np.float64],
+    phase_ms: float,
     first: int,
     last: int,
     limit: int,
@@ -153,18 +167,15 @@ def _drive(
 ) -> tuple[int, int, int]:
     if first == 0:
         place(s, p, start[0], start[1], start[2])
-        k.row = k.due_step = k.line = 0
-        k.until = -1
-        k.due_ms = k.left_duty = k.right_duty = 0.0
-        k.tile = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+        begin_program(k, phase_ms, c.dt, s, p, floor)
     remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
     for n in range(first, last):
         k.step = n
-        now = _tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+        now = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
         outcome = RUNNING
         if now != k.tile:
             k.tile = now
-            outcome, passed = _arrive(now, passed, n * c.dt, floor, arrival)
+            outcome, passed = arrive(now, passed, n * c.dt, floor, arrival)
         if outcome == RUNNING and n >= limit:
             outcome = OUT_OF_TIME
         if outcome == RUNNING:
@@ -181,7 +192,7 @@ def _drive(
     return RUNNING, last, passed
 
 
-@compiled
+@kernel
 def hold_duties(
     first: int,
     last: int,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 from gecar.language.opcodes import JUMP, MOTOR_UNTIL, TEST
 from gecar.world.randomness import normal
 from gecar.world.sensing import RING, delayed, glance, lag_keep, lagged, reported
@@ -61,7 +61,7 @@ EYES = np.dtype(
 )
 
 
-@compiled
+@kernel
 def _side(sensor: int, p: Any) -> float:
     """Return how far to the left of the middle one a sensor sits [m]."""
     if sensor == 1:
@@ -69,13 +69,13 @@ def _side(sensor: int, p: Any) -> float:
     return -p.side_sensor_left if sensor == 2 else 0.0
 
 
-@compiled
+@kernel
 def see(sensor: int, s: Any, p: Any, floor: Floor) -> float:
     """Return what a colour sensor sees now [%]."""
     return glance(floor.averaged, floor.pitch, s, _side(sensor, p), p)
 
 
-@compiled
+@kernel
 def look(n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> None:
     """Feed the sensors' memory at step ``n``; only sensors with lag or delay need one."""
     keep = lag_keep(dt, p.sensor_lag)
@@ -90,7 +90,7 @@ def look(n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> None:
             eyes.rings[ring + (n & (RING - 1))] = lagged(before, now, keep)
 
 
-@compiled
+@kernel
 def read_sensor(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> float:
     """Return the whole percent a sensor reports at step ``n``."""
     if p.sensor_lag == 0.0 and p.sensor_delay == 0.0:
@@ -101,7 +101,7 @@ def read_sensor(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, ey
     return reported(level, noise, p)
 
 
-@compiled
+@kernel
 def holds(reading: float, comparison: int, threshold: float) -> bool:
     """Whether a reading compares with a threshold as asked (codes as in `gecar.language.opcodes`)."""
     if comparison == 0:
@@ -115,7 +115,7 @@ def holds(reading: float, comparison: int, threshold: float) -> bool:
     return (reading == threshold) == (comparison == 4)
 
 
-@compiled
+@kernel
 def test_row(
     program: npt.NDArray[np.int32], row: int, k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
@@ -124,7 +124,7 @@ def test_row(
     return holds(reading, program[row, 2], program[row, 3] / 1000.0)
 
 
-@compiled
+@kernel
 def _goes_on(
     program: npt.NDArray[np.int32], k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
@@ -138,16 +138,22 @@ def _goes_on(
     return True
 
 
-@compiled
+@kernel
+def first_step_after(due_ms: float, dt: float) -> int:
+    """Return the first step at or after a time [ms]."""
+    return math.ceil(due_ms / (1000.0 * dt) - 1e-6)
+
+
+@kernel
 def run_program(
     program: npt.NDArray[np.int32], k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
-    """Run statements until the robot waits again.
+    """Run statements until the robot waits again; a pass that takes no time waits for the next step.
 
     Returns
     -------
     bool
-        False if a whole pass takes no time: the program is stuck.
+        False if the program is stuck: a whole pass takes no time, the robot stands, and nothing it reads can change.
     """
     if not _goes_on(program, k, s, p, dt, floor, eyes):
         return True
@@ -163,13 +169,22 @@ def run_program(
             k.row = program[k.row, 4]
         elif _command(program, k, eyes):
             passes = 0
-            k.due_step = math.ceil(k.due_ms / (1000.0 * dt) - 1e-6)
+            k.due_step = first_step_after(k.due_ms, dt)
             if k.due_step > k.step:
                 return True
-    return False
+    k.due_step = k.step + 1
+    k.due_ms = 1000.0 * dt * k.due_step
+    return not _stands_for_ever(k, s, eyes)
 
 
-@compiled
+@kernel
+def _stands_for_ever(k: Any, s: Any, eyes: Any) -> bool:
+    """Whether a robot whose program takes no time stands without command and noise, so that nothing changes."""
+    still = s.vx == 0.0 and s.vy == 0.0 and s.yaw_rate == 0.0 and s.left_speed == 0.0 and s.right_speed == 0.0
+    return still and k.left_duty == 0.0 and k.right_duty == 0.0 and eyes.noise_pct == 0.0
+
+
+@kernel
 def _command(program: npt.NDArray[np.int32], k: Any, eyes: Any) -> bool:
     """Run the MOTOR or MOTOR_UNTIL the program stands at; return whether it takes time."""
     row = k.row

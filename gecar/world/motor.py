@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
+from gecar.world.series import decay, sine
 
 # rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
 FULL_SPEED = math.radians(1000.0)
@@ -14,22 +15,26 @@ FULL_SPEED = math.radians(1000.0)
 FULL_DUTY = 0.999  # from here on a bridge no longer switches
 
 
-@compiled
-def conduct(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
+@kernel
+def conduct(
+    duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any, effects: bool = True
+) -> float:
     """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
 
     J dw/dt = Kt (duty V - Ke w) / R - b w, stepped exactly: the back-EMF damps the shaft within 0.1 s.
     """
     free = c.keep * speed
     driven = free + c.drive_gain * duty * voltage
+    if not effects:
+        return driven
     if c.ripple != 0.0:
-        driven += c.ripple * math.sin(p.ripple_cycles * angle + p.ripple_phase)
+        driven += c.ripple * sine(p.ripple_cycles * angle + p.ripple_phase)
     # Firmware may take power away to hold the limit, not reverse it.
     driven = min(driven, max(p.speed_limit, free))
     return max(driven, min(-p.speed_limit, free))
 
 
-@compiled
+@kernel
 def awake(duty: float, t: float, p: Any, c: Any) -> float:
     """Return a duty as motors that first answer some time after the start get it; t is the step's start [s]."""
     if p.start_latency > 0.0:
@@ -37,9 +42,11 @@ def awake(duty: float, t: float, p: Any, c: Any) -> float:
     return duty
 
 
-@compiled
-def effective_duty(duty: float, gain: float, p: Any) -> float:
+@kernel
+def effective_duty(duty: float, gain: float, p: Any, effects: bool = True) -> float:
     """Return the share of the supply that reaches a motor: dead band, gain by side and direction, full duty's own."""
+    if not effects:
+        return duty * gain
     if abs(duty) < p.dead_band:
         return 0.0
     past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
@@ -49,18 +56,20 @@ def effective_duty(duty: float, gain: float, p: Any) -> float:
     return past * gain * direction
 
 
-@compiled
-def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any) -> float:
+@kernel
+def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, effects: bool = True) -> float:
     """Return the largest impulse [N m s] dry friction can give a shaft in one step."""
     budget = c.sliding
+    if not effects:
+        return budget
     if p.static_friction != 0.0:
         ratio = speed / p.stribeck_speed
-        budget += p.static_friction * c.dt * math.exp(-ratio * ratio)
+        budget += p.static_friction * c.dt * decay(ratio * ratio)
     ratio = p.friction_ratio if speed > 0.0 else -p.friction_ratio
     return budget * (1.0 + ratio) + p.rolling_resistance * load * radius * c.dt
 
 
-@compiled
+@kernel
 def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
     """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air."""
     driven = conduct(duty, voltage, angle, speed, p, c)
@@ -68,25 +77,25 @@ def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, 
     return driven - min(max(driven, -budget), budget)
 
 
-@compiled
+@kernel
 def supply(s: Any, p: Any) -> float:
     """Return the battery's terminal voltage [V] under the last step's current."""
     return p.voltage * p.supply_scale - p.battery_drain * s.t - p.battery_resistance * s.battery_current
 
 
-@compiled
+@kernel
 def motor_current(duty: float, voltage: float, speed: float, p: Any) -> float:
     """Return a motor's current [A]."""
     return (duty * voltage - p.back_emf_constant * speed) / p.resistance
 
 
-@compiled
+@kernel
 def slewed(duty: float, last: float, c: Any) -> float:
     """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
     return min(max(duty, last - c.slew), last + c.slew)
 
 
-@compiled
+@kernel
 def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
     """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
 

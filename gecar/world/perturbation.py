@@ -1,35 +1,46 @@
-"""Robots as they come: each a little different from the nominal one, and set down a little differently."""
+"""Conditions as they may be: a robot, a start and a clock, each a little different from what the simulation assumes.
+
+Nobody knows these numbers before a drive, so a program has to drive under all of them: the noise envelope of Jakobi
+(Adaptive Behavior 6(2), 1997), today called domain randomisation.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtri
 
 from gecar.errors import expected
-from gecar.world.course import Pose
-from gecar.world.rollout import Noise, World
+from gecar.world.conditions import Conditions, conditions, select
+from gecar.world.rollout import Drive, Driver, World
 
 MOST = 10_000
 
+Floats = npt.NDArray[np.float64]
 
-def perturbed(world: World, count: int, seed: int = 0) -> tuple[World, ...]:
-    """Return a world's robot and start as they may really be, each drawn on its own.
 
-    Spreads: motors 2 % apart (standard deviation), dry friction 0.6 to 1.6 of nominal, battery 4 % around its level,
-    grip 0.6 to 0.9, white read as 85 to 100 and black as 0 to 8 %, readings noisy by 1 %, start 5 mm and 2 degrees off.
+def drawn_conditions(world: World, count: int, seed: int | tuple[int, ...] = 0) -> Conditions:
+    """Draw conditions a world's programs may meet.
+
+    Spreads (standard deviations, or ranges): motors 2 % apart, dry friction 0.6 to 1.6 of the robot's, battery 4 %
+    around its level, grip 2/3 to 1 of the robot's, white read as 85 to 100 % of itself and black as up to 8 % more,
+    readings noisy by 1 %, start 5 mm and 2 degrees off, the program begins within 10 ms, steps of 2 to 4 ms.
     Sources: step fits of five EV3 motors (gain 6.7 to 12 deg/s per percent, Coulomb friction 13 to 50 deg/s, here
     within one robot's life), 7.4 to 9 V over a charge with the mean recalibrated, white 50 to 98 and black 2 to 10 %
-    before, and within this after, calibration.
+    before, and within this after, calibration. Phase and step are the simulation's own freedom: what a program gains
+    by either of them is no gain.
+
+    Each number is drawn by Latin hypercube sampling (McKay, Beckman and Conover, Technometrics 21(2), 1979), so that
+    every set of conditions covers weak and strong batteries, low and high grip alike.
 
     Parameters
     ----------
     world
-        The nominal one.
+        What the simulation assumes.
     count
         How many.
     seed
-        Where they come from; the first ones of a seed are always the same.
+        Where they come from.
 
     Raises
     ------
@@ -37,32 +48,42 @@ def perturbed(world: World, count: int, seed: int = 0) -> tuple[World, ...]:
         If the count is not 0 to 10,000.
     """
     if not 0 <= count <= MOST:
-        raise expected("perturbed robots", count, f"0 to {MOST}")
-    return tuple(_one(world, np.random.default_rng((seed, k))) for k in range(count))
+        raise expected("drawn conditions", count, f"0 to {MOST}")
+    u = _latin_hypercube(count, 11, np.random.default_rng(seed))
+    physics = np.repeat(world.robot.physics, count)
+    physics["gain_difference"] += np.clip(0.02 * ndtri(u[0]), -0.1, 0.1)
+    physics["coulomb_friction"] *= 0.6 + u[1]
+    physics["supply_scale"] *= np.clip(1.0 + 0.04 * ndtri(u[2]), 0.8, 1.2)
+    physics["tyre_friction"] *= (2.0 + u[3]) / 3.0
+    lifted = 8.0 * u[5]
+    gain = 0.85 + 0.15 * u[4] - 0.01 * lifted
+    physics["sensor_gain"] *= gain
+    physics["sensor_offset"] = gain * physics["sensor_offset"] + lifted
+    shifts = np.stack([0.005 * ndtri(u[6]), 0.005 * ndtri(u[7]), np.radians(2.0) * ndtri(u[8])], axis=1)
+    return conditions(
+        physics,
+        0.002 + 0.002 * u[9],
+        world.start + shifts,
+        world.time_limit_s,
+        10.0 * u[10],
+        max(world.noise.sensor_pct, 1.0),
+        world.noise.motor_share,
+    )
 
 
-def _one(world: World, rng: np.random.Generator) -> World:
-    robot, course = world.robot, world.course
-    white, black = rng.uniform(85.0, 100.0), rng.uniform(0.0, 8.0)
-    nominal = robot.colour_sensor.white - robot.colour_sensor.black
-    gain = (white - black) / nominal
-    changed = robot.with_effects(
-        {
-            "motor_gain_asymmetry": {"right_minus_left": float(np.clip(0.02 * rng.normal(), -0.1, 0.1))},
-            "coulomb_friction": {"torque_nm": robot.motor.coulomb_friction * float(rng.uniform(0.6, 1.6))},
-            "supply_voltage": {"scale": float(np.clip(1.0 + 0.04 * rng.normal(), 0.8, 1.2))},
-            "tyre_friction": {"coefficient": float(rng.uniform(0.6, 0.9))},
-            "sensor_gain": {
-                "gain": float(gain),
-                "offset_pct": float(black - gain * robot.colour_sensor.black),
-            },
-        }
-    )
-    x, y = 0.005 * rng.normal(size=2)
-    start = Pose(
-        course.start.x_m + float(x),
-        course.start.y_m + float(y),
-        course.start.heading_rad + float(np.radians(2.0) * rng.normal()),
-    )
-    noise = Noise(max(world.noise.sensor_pct, 1.0), world.noise.motor_share)
-    return replace(world, robot=changed, course=course.starting(start), noise=noise)
+def under_drawn_conditions(
+    world: World, opcodes: npt.NDArray[np.int32], count: int, seed: int | tuple[int, ...] = 0
+) -> list[Drive]:
+    """Drive a program under drawn conditions, and keep the traces."""
+    under = drawn_conditions(world, count, seed)
+    return [
+        Driver(world, select(under, [k])).simulate(opcodes, seed=k + 1, trace=True) for k in range(len(under))
+    ]
+
+
+def _latin_hypercube(count: int, dimensions: int, rng: np.random.Generator) -> Floats:
+    """Return points in the open unit cube, shape (dimensions, count), one in each of ``count`` slices of every axis."""
+    slices = rng.permuted(np.tile(np.arange(count, dtype=float), (dimensions, 1)), axis=1)
+    inside = rng.uniform(1e-9, 1.0, (dimensions, count))
+    points: Floats = (slices + inside * (1.0 - 1e-9)) / max(count, 1)
+    return points

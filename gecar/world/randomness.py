@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 
 
-@compiled
+@kernel
 def uniform(holder: Any) -> float:
     """Return the next number in (0, 1): SplitMix64 (Steele, Lea, Flood, OOPSLA 2014), the top 53 bits.
 
@@ -24,7 +24,7 @@ def uniform(holder: Any) -> float:
     return (np.float64(z >> np.uint64(11)) + 0.5) * (1.0 / 9007199254740992.0)
 
 
-@compiled
+@kernel
 def normal(holder: Any) -> float:
     """Return the next standard normal number, by Box and Muller."""
     radius = math.sqrt(-2.0 * math.log(uniform(holder)))

@@ -11,15 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import expected
-from gecar.language.opcodes import TEST
+from gecar.language.opcodes import N_COLUMNS, TEST
 from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.conditions import Conditions, conditions, select
 from gecar.world.course import Course
 from gecar.world.driving import drive
 from gecar.world.interpreter import CONTROL, EYES, Floor
+from gecar.world.lanes import Ends, Jobs, drive_lanes, make_memory
 from gecar.world.robot import Robot
 from gecar.world.sensing import RING
 from gecar.world.space import build_engine
-from gecar.world.state import DERIVED, STATE, derive
+from gecar.world.state import STATE
 
 STEP_S = 0.002  # benchmarks/convergence.py shows what halving it moves
 TRACE_S = 0.01
@@ -142,6 +144,12 @@ class World:
         """Start pose of the axle's centre [m, m, rad], shape (3,)."""
         return np.array([self.course.start.x_m, self.course.start.y_m, self.course.start.heading_rad])
 
+    @property
+    def nominal(self) -> Conditions:
+        """The conditions this world says, one row."""
+        noise = self.noise.sensor_pct, self.noise.motor_share
+        return conditions(self.robot.physics, self.step_s, self.start, self.time_limit_s, 0.0, *noise)
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -175,23 +183,30 @@ class Drive:
 
 
 class Driver:
-    """One world's arrays, made once, and drives on them."""
+    """One world's arrays, made once, and drives on them.
 
-    def __init__(self, world: World) -> None:
+    Parameters
+    ----------
+    world
+        Robot and course.
+    under
+        Other conditions than the world's own, one row.
+    """
+
+    def __init__(self, world: World, under: Conditions | None = None) -> None:
+        under = world.nominal if under is None else under
         self.world = world
-        self.physics = world.robot.physics
-        self.derived = np.zeros(1, DERIVED)
-        derive(self.physics[0], world.step_s, self.derived[0])
+        self.physics, self.derived, self.start = under.physics, under.derived, under.start[0]
+        self.phase_ms, self.limit = float(under.phase_ms[0]), int(under.limit[0])
+        self.step_s = float(under.derived["dt"][0])
         self.state = np.zeros(1, STATE)
         self.control = np.zeros(1, CONTROL)
         self.floor = world.floor
-        self.start = world.start
-        self.limit = round(world.time_limit_s / world.step_s)
         self.obstacles: list[Any] = []
         self.commands = np.zeros(2 * RING)
         self.eyes = np.zeros(1, EYES)
-        self.eyes["noise_pct"] = world.noise.sensor_pct
-        self.eyes["motor_noise"] = world.noise.motor_share
+        self.eyes["noise_pct"] = under.sensor_noise_pct
+        self.eyes["motor_noise"] = under.motor_noise
         self.engine, self.buffer, self.count = NO_ENGINE, NO_BUFFER, NO_COUNT
 
     def simulate(self, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
@@ -207,7 +222,7 @@ class Driver:
             Whether to keep the time series.
         """
         self.reset()
-        every = round(TRACE_S / self.world.step_s)
+        every = round(TRACE_S / self.step_s)
         arrival = np.full(len(self.floor.sequence), np.nan)
         self.eyes["used"] = sensors_used(opcodes)
         self.eyes["stream"] = seed
@@ -218,7 +233,7 @@ class Driver:
         while outcome == Outcome.RUNNING:
             poses.append([(*body.position, body.angle) for body in self.obstacles])
             outcome, n, passed = drive(
-                opcodes, self.physics, self.derived, self.state, self.control, self.floor, self.start,
+                opcodes, self.physics, self.derived, self.state, self.control, self.floor, self.start, self.phase_ms,
                 n, n + chunk, self.limit, passed, self.eyes, self.commands,
                 self.engine, self.buffer, self.count, arrival, samples, every,
             )  # fmt: skip
@@ -226,7 +241,7 @@ class Driver:
         kept = samples[~np.isnan(samples[:, 0])]
         return Drive(
             Outcome(outcome),
-            n * self.world.step_s,
+            n * self.step_s,
             checkpoints,
             arrival,
             n,
@@ -242,13 +257,6 @@ class Driver:
             self.engine, self.buffer, self.count = self._keep.addresses, self._keep.buffer, self._keep.count
 
 
-def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
-    """Return which of the sensors (centre, left, right) a program reads, shape (3,)."""
-    used = np.zeros(3, np.bool_)
-    used[opcodes[opcodes[:, 0] == TEST, 1]] = True
-    return used
-
-
 def simulate(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
     """Drive one program; see `Driver.simulate`."""
     return Driver(world).simulate(opcodes, seed, trace)
@@ -257,10 +265,96 @@ def simulate(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0, trace:
 SUMMARY = np.dtype([("outcome", np.int8), ("time_s", float), ("checkpoints", np.int32), ("steps", np.int64)])
 
 
+class Fleet:
+    """One course's arrays, made once, and many drives at a time: in lanes, or one by one where something is touched."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.floor = world.floor
+        self._memory = make_memory()
+
+    def drive(
+        self,
+        programs: Sequence[npt.NDArray[np.int32]],
+        under: Conditions,
+        pairs: npt.ArrayLike,
+        streams: npt.ArrayLike,
+    ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.float64]]:
+        """Drive programs, each from START to its outcome.
+
+        Parameters
+        ----------
+        programs
+            Opcodes, each of shape (rows, 6).
+        under
+            Conditions.
+        pairs
+            Which program drives under which conditions, shape (n, 2).
+        streams
+            Seed of each drive's noise, shape (n,).
+
+        Returns
+        -------
+        tuple
+            Summaries of dtype `SUMMARY`, shape (n,), and when each tile of the course's sequence was reached [s], nan
+            where it was not, shape (n, k).
+        """
+        which = np.asarray(pairs, np.int64).reshape(-1, 2)
+        seeds = np.asarray(streams, np.uint64)
+        make = self._one_by_one if self.world.uses_pymunk else self._in_lanes
+        ends = make(programs, under, which, seeds)
+        summary = np.zeros(len(which), SUMMARY)
+        summary["outcome"], summary["steps"] = ends.outcome, ends.steps
+        summary["time_s"] = ends.steps * under.derived["dt"][which[:, 1]]
+        summary["checkpoints"] = np.minimum(ends.passed, len(self.floor.sequence) - 1)
+        return summary, ends.arrival_s
+
+    def _in_lanes(
+        self,
+        programs: Sequence[npt.NDArray[np.int32]],
+        under: Conditions,
+        which: npt.NDArray[np.int64],
+        streams: npt.NDArray[np.uint64],
+    ) -> Ends:
+        rows = np.concatenate([np.zeros((0, N_COLUMNS), np.int32), *programs])
+        first_row = np.cumsum([0, *map(len, programs)]).astype(np.int64)
+        used = np.array([sensors_used(opcodes) for opcodes in programs]).reshape(-1, 3)
+        ends = self._no_ends(len(which))
+        jobs = Jobs(rows, first_row, used, which[:, 0].copy(), which[:, 1].copy(), streams)
+        drive_lanes(jobs, under, self.floor, self._memory, ends)
+        return ends
+
+    def _one_by_one(
+        self,
+        programs: Sequence[npt.NDArray[np.int32]],
+        under: Conditions,
+        which: npt.NDArray[np.int64],
+        streams: npt.NDArray[np.uint64],
+    ) -> Ends:
+        ends = self._no_ends(len(which))
+        drivers = {row: Driver(self.world, select(under, [row])) for row in set(which[:, 1].tolist())}
+        for k, (program, row) in enumerate(which.tolist()):
+            result = drivers[row].simulate(programs[program], int(streams[k]))
+            ends.outcome[k], ends.steps[k], ends.arrival_s[k] = result.outcome, result.steps, result.arrival_s
+            ends.passed[k] = np.count_nonzero(~np.isnan(result.arrival_s))
+        return ends
+
+    def _no_ends(self, n: int) -> Ends:
+        arrival = np.full((n, len(self.floor.sequence)), np.nan)
+        return Ends(np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros(n, np.int32), arrival)
+
+
+def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
+    """Return which of the sensors (centre, left, right) a program reads, shape (3,)."""
+    used = np.zeros(3, np.bool_)
+    used[opcodes[opcodes[:, 0] == TEST, 1]] = True
+    return used
+
+
 def simulate_many(
     world: World, programs: Sequence[npt.NDArray[np.int32]], seeds: Sequence[int] | None = None
 ) -> npt.NDArray[np.void]:
-    """Drive many programs, each from START.
+    """Drive many programs, each from START; see `Fleet.drive`.
 
     Parameters
     ----------
@@ -274,9 +368,6 @@ def simulate_many(
     numpy.ndarray
         Dtype `SUMMARY`, shape (n,).
     """
-    driver = Driver(world)
-    summary = np.zeros(len(programs), SUMMARY)
-    for i, opcodes in enumerate(programs):
-        result = driver.simulate(opcodes, seeds[i] if seeds is not None else 0)
-        summary[i] = (result.outcome, result.time_s, result.checkpoints, result.steps)
-    return summary
+    n = len(programs)
+    pairs = np.stack([np.arange(n), np.zeros(n)], axis=1)
+    return Fleet(world).drive(programs, world.nominal, pairs, np.zeros(n) if seeds is None else seeds)[0]

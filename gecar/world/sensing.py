@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.fft
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 
-# Most steps a delay may span: 0.25 s at the smallest step of 0.25 ms, in a ring whose size is a power of two.
-RING = 1024
+# Most steps a delay may span: 0.25 s at the smallest step of 0.1 ms, in a ring whose size is a power of two.
+RING = 4096
 
 
 def _disc_points() -> npt.NDArray[np.float64]:
@@ -65,7 +65,7 @@ def _disc_weights(radius: float) -> npt.NDArray[np.float64]:
     return covered.reshape(2 * n + 1, 20, 2 * n + 1, 20).sum((1, 3)).astype(np.float64)
 
 
-@compiled
+@kernel
 def spot_reach(pitch: float, diameter: float) -> float:
     """Return the diameter [m] to average over for a spot: cells blur by themselves.
 
@@ -75,7 +75,7 @@ def spot_reach(pitch: float, diameter: float) -> float:
     return math.sqrt(max(diameter * diameter - 4.0 * pitch * pitch, 0.0))
 
 
-@compiled
+@kernel
 def glance(averaged: npt.NDArray[np.float32], pitch: float, s: Any, left: float, p: Any) -> float:
     """Return what the sensor sees [%], before lag, delay and noise, on a floor averaged by `spot_average`.
 
@@ -98,7 +98,7 @@ def glance(averaged: npt.NDArray[np.float32], pitch: float, s: Any, left: float,
     return p.black + (p.white - p.black) * floor_brightness(averaged, pitch, x, y) / 255.0
 
 
-@compiled
+@kernel
 def floor_brightness(raster: npt.NDArray[Any], pitch: float, x: float, y: float) -> float:
     """Return the floor's brightness at a point [m], 0 (line) to 255, bilinear; bare floor outside the field."""
     column = x / pitch - 0.5
@@ -116,7 +116,7 @@ def floor_brightness(raster: npt.NDArray[Any], pitch: float, x: float, y: float)
     return (1.0 - up) * below + up * above
 
 
-@compiled
+@kernel
 def spot_reflection(
     raster: npt.NDArray[np.uint8],
     pitch: float,
@@ -159,26 +159,26 @@ def spot_reflection(
     return p.black + (p.white - p.black) * share
 
 
-@compiled
+@kernel
 def reported(reflection: float, noise: float, p: Any) -> float:
     """Return the whole percent the sensor reports for a reflection [%] with noise [%] added."""
     level = p.sensor_gain * reflection + p.sensor_offset + noise
     return min(max(math.floor(level + 0.5), 0.0), 100.0)
 
 
-@compiled
+@kernel
 def lagged(last: float, now: float, keep: float) -> float:
     """Return a first-order lag's output; ``keep`` = exp(-step / time constant), 0 without lag."""
     return keep * last + (1.0 - keep) * now
 
 
-@compiled
+@kernel
 def lag_keep(dt: float, time_constant: float) -> float:
     """Return the share of its old value a lag keeps over a step; 0 without lag."""
     return math.exp(-dt / time_constant) if time_constant > 0.0 else 0.0
 
 
-@compiled
+@kernel
 def delayed(rings: npt.NDArray[np.float64], ring: int, newest: int, steps: float) -> float:
     """Return a value ``steps`` (any real number) before the newest, linear between entries.
 

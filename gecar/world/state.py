@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 
 GRAVITY = 9.81  # m/s^2
 REGULATOR_RATE = 30.0  # rad/s
@@ -35,7 +35,7 @@ DERIVED = np.dtype([(field, np.float64) for field in _DERIVED_FIELDS.split()])
 """What follows from the robot's constants and the step size."""
 
 
-@compiled
+@kernel
 def derive(p: Any, dt: float, c: Any) -> None:
     """Compute a drive's derived constants.
 
@@ -75,7 +75,7 @@ def derive(p: Any, dt: float, c: Any) -> None:
     _contact_masses(c)
 
 
-@compiled
+@kernel
 def _rotor(p: Any, dt: float, c: Any) -> None:
     """Set the shaft's inertia over a step, and how much of its speed it keeps.
 
@@ -95,7 +95,7 @@ def _rotor(p: Any, dt: float, c: Any) -> None:
     c.regulator_i = REGULATOR_RATE * REGULATOR_RATE * tau / gain * dt
 
 
-@compiled
+@kernel
 def _contact_masses(c: Any) -> None:
     """Invert the matrix that maps impulses (left, right, sideways at the axle) to the slip they end."""
     yaw = c.half_track * c.half_track * c.inv_inertia
@@ -124,7 +124,7 @@ def _contact_masses(c: Any) -> None:
     c.caster_mass = 1.0 / (c.inv_mass + c.caster * c.caster * c.inv_inertia)
 
 
-@compiled
+@kernel
 def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     """Put the robot at rest with its axle's centre at a pose [m, m, rad]."""
     for_zero = 0.0

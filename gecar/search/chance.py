@@ -1,0 +1,152 @@
+"""Fitness as a chance: the time a program takes to GOAL where it arrives under nearly all conditions it may meet.
+
+Eq. 1 is the time of one drive, in a simulation whose step, start and robot are known to the last digit. A search finds
+programs that owe their time to those digits and leave the course elsewhere: the reality gap of Jakobi (1997), and what
+Koos, Mouret and Doncieux (IEEE T-EC 17(1), 2013) call transferability. Here a program is driven under conditions drawn
+anew in every generation (`gecar.world.perturbation`). What counts is a chance-constrained quantile of eq. 1: the median
+time to GOAL, if the required share of all its drives so far arrives, and 10^4 if not. Programs met again in later
+generations are driven again, so that luck does not last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.search.fitness import UNSOLVED
+from gecar.world.conditions import joined
+from gecar.world.perturbation import drawn_conditions
+from gecar.world.rollout import Fleet, Outcome, World
+
+ROUNDS = 8
+"""Sets of drawn conditions after which a program is not driven again."""
+FIRST_DRAWS = 3
+"""Drawn conditions a program meets before the rest: one that misses GOAL too often drives no further (racing)."""
+MARGIN = 1.05
+"""How far behind the best so far, in time to GOAL, a program is let go after the first draws."""
+STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
+"""Steps a result is checked at [s]."""
+
+Floats = npt.NDArray[np.float64]
+
+
+def pool(score: np.void, share: float) -> None:
+    """Set a score's merit and share from the drives it holds.
+
+    Parameters
+    ----------
+    score
+        A row of dtype `gecar.search.fitness.score_type`; ``fitness_s`` and ``drawn_s`` are set, and ``share`` is how
+        far the nominal drive came where it missed GOAL.
+    share
+        Required share of arrivals.
+    """
+    if score["fitness_s"] >= UNSOLVED:
+        score["merit_s"], score["share"] = UNSOLVED, 0.5 * score["share"]
+        return
+    drawn = score["drawn_s"]
+    times = np.concatenate([[score["fitness_s"]], drawn[~np.isnan(drawn)]])
+    arrived = np.isfinite(times)
+    enough = arrived.mean() >= share
+    score["merit_s"] = np.median(times[arrived]) if enough else UNSOLVED
+    score["share"] = 1.0 if enough else 0.5 + 0.5 * arrived.sum() / max(len(drawn) / ROUNDS + 1, len(times))
+
+
+def add_drives(score: np.void, more: np.void, share: float) -> None:
+    """Add the drives of a program met again to those it had; a full score stays as it is."""
+    old, new = score["drawn_s"], more["drawn_s"]
+    free = np.flatnonzero(np.isnan(old))
+    fresh = new[~np.isnan(new)][: len(free)]
+    old[free[: len(fresh)]] = fresh
+    score["steps"] = more["steps"]
+    pool(score, share)
+
+
+def wants_more(score: np.void) -> bool:
+    """Whether a program met again is to be driven again: it has arrived often enough so far, and has room."""
+    return bool(score["merit_s"] < UNSOLVED and np.isnan(score["drawn_s"]).any())
+
+
+class Arrivals(NamedTuple):
+    """How a program fares under drawn conditions: times to GOAL [s], inf where it missed GOAL, shape (draws,)."""
+
+    times_s: Floats
+
+    @property
+    def share(self) -> float:
+        """Share of drives at GOAL."""
+        return float(np.isfinite(self.times_s).mean())
+
+    def quantile_s(self, q: float) -> float | None:
+        """Return a quantile of the times of those at GOAL [s]; None where none arrived."""
+        arrived = self.times_s[np.isfinite(self.times_s)]
+        return float(np.quantile(arrived, q)) if len(arrived) else None
+
+
+def arrivals(
+    world: World, programs: Sequence[npt.NDArray[np.int32]], draws: int, seed: int | tuple[int, ...]
+) -> list[Arrivals]:
+    """Drive programs under the same fresh conditions.
+
+    Parameters
+    ----------
+    world
+        What the simulation assumes.
+    programs
+        Opcodes.
+    draws
+        How many conditions.
+    seed
+        Where they come from.
+    """
+    under = drawn_conditions(world, draws, seed)
+    pairs = np.stack(np.divmod(np.arange(len(programs) * draws), draws), axis=1)
+    summary, _ = Fleet(world).drive(programs, under, pairs, np.arange(len(pairs)) % draws + 1)
+    times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+    return [Arrivals(row) for row in times.reshape(len(programs), draws)]
+
+
+def times_at_steps(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0) -> dict[str, float | None]:
+    """Return a program's time to GOAL on the nominal robot at each of `STEPS_S` [s]; None where it misses GOAL."""
+    worlds = [
+        World(world.robot, world.course, step, world.time_limit_s, world.noise, world.engine)
+        for step in STEPS_S
+    ]
+    under = joined([each.nominal for each in worlds])
+    pairs = np.stack([np.zeros(len(worlds)), np.arange(len(worlds))], axis=1)
+    summary, _ = Fleet(world).drive([opcodes], under, pairs, np.full(len(worlds), seed))
+    return {
+        f"{step:g}": float(row["time_s"]) if row["outcome"] == Outcome.GOAL else None
+        for step, row in zip(STEPS_S, summary, strict=True)
+    }
+
+
+def merit_of(times: Arrivals, share: float) -> float:
+    """Return the median time of what arrives often enough, else 10^4 and how much is missing, for comparisons."""
+    median = times.quantile_s(0.5)
+    return median if median is not None and times.share >= share else UNSOLVED + 1.0 - times.share
+
+
+def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float, seed: int) -> int:
+    """Return which of a search's best programs is best on fresh draws: all on 64, the better quarter on 448 more.
+
+    What looks best in a search is partly lucky; these draws are none of the search's, and the result is measured on
+    others again.
+    """
+    first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
+    order = np.argsort([merit_of(times, share) for times in first], kind="stable")
+    left = order[: max(1, (len(order) + 3) // 4)].tolist()
+    second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1))
+    both = [
+        Arrivals(np.concatenate([first[k].times_s, more.times_s]))
+        for k, more in zip(left, second, strict=True)
+    ]
+    return int(left[int(np.argmin([merit_of(times, share) for times in both]))])
+
+
+_CHOICE, REPORT = 1_000_003, 1_000_033
+"""Streams of draws beside those of the generations: for the choice at the end, and for what is reported."""
+REPORTED_DRAWS = 200
