@@ -123,7 +123,9 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
         due = True
         while True:
             if effects:
-                _look(floor, m)
+                for lane in range(LANES):
+                    if m.job[lane] >= 0:
+                        _look_from(lane, floor, m)
             if due:
                 going = False
                 for lane in range(LANES):
@@ -232,20 +234,19 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
     e.noise_pct = under.sensor_noise_pct[condition]
     e.motor_noise = under.motor_noise[condition]
     e.stream = jobs.stream[waiting]
+    _look_from(lane, floor, m)
     return waiting + 1
 
 
 @kernel
-def _look(floor: Floor, m: Memory) -> None:
-    """Feed the sensors' memories, where they lag or are late."""
-    for lane in range(LANES):
-        if m.job[lane] >= 0:
-            p = _load_physics(m.flat, lane)
-            if p.sensor_lag > 0.0 or p.sensor_delay > 0.0:
-                s = _load_state(m.flat, lane)
-                k = _load_carried(m.flat, lane)
-                c = _load_derived(m.flat, lane)
-                look(int(k.step), s, p, c.dt, floor, m.eyes[lane])
+def _look_from(lane: int, floor: Floor, m: Memory) -> None:
+    """Feed the sensors' memories of a lane, where they lag or are late."""
+    p = _load_physics(m.flat, lane)
+    if p.sensor_lag > 0.0 or p.sensor_delay > 0.0:
+        s = _load_state(m.flat, lane)
+        k = _load_carried(m.flat, lane)
+        c = _load_derived(m.flat, lane)
+        look(int(k.step), s, p, c.dt, floor, m.eyes[lane])
 
 
 @kernel
