@@ -15,7 +15,7 @@ Pose = tuple[float, float, float]
 
 # The nominal robot's constants, copied by hand: no code is shared with gecar or with benchmarks/concealed.
 MASS, YAW_INERTIA = 0.75, 0.0040  # kg, kg m^2 about the centre of mass: everything
-COM_AHEAD, COM_HEIGHT = -0.0322, 0.050  # m, centre of mass of everything, from the axle's centre and the floor
+COM_AHEAD, COM_HEIGHT = -0.0322, 0.050  # m, centre of mass of everything, ahead of the axle, above the floor
 TRACK, RADIUS, CASTER_AHEAD = 0.120, 0.028, -0.085  # m
 KT, KE, RESISTANCE = 0.2746, 0.4731, 5.50  # N m / A, V s / rad, ohm
 ROTOR_INERTIA, DRY_FRICTION = 0.00248, 0.0165  # kg m^2 and N m at the shaft
@@ -136,7 +136,8 @@ class BulletRobot:
             body: int = pybullet.loadURDF(
                 str(file), flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
             )
-        for link, rub in ((-1, 0.0), (0, variation.grip), (1, variation.grip)):  # Bullet multiplies both sides' coefficients
+        # Bullet multiplies the coefficients of both that touch; the floor's is 1.
+        for link, rub in ((-1, 0.0), (0, variation.grip), (1, variation.grip)):
             _rub(body, link, rub, client)
         # In a call of its own: together with this, Bullet 3.2.7 gives every setting to the base.
         awake = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING

@@ -31,9 +31,9 @@ class MujocoRobot:
         self._model = build(self._hidden)
         self._steps = round(TICK_S / self._model.opt.timestep)
         self._shafts_at = [int(self._model.joint(side).dofadr[0]) for side in ("left", "right")]
-        self._model.pair_friction[[self._model.pair(f"{side}_floor").id for side in ("left", "right")], :2] = (
-            variation.grip
-        )
+        self._model.pair_friction[
+            [self._model.pair(f"{side}_floor").id for side in ("left", "right")], :2
+        ] = variation.grip
         self._settled = mujoco.MjData(self._model)
         mujoco.mj_step(self._model, self._settled, nstep=_SETTLE_STEPS)
         self.place(0.0, 0.0, 0.0)
