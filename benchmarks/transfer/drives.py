@@ -62,9 +62,10 @@ class Drives:
         return [(winner, engine, k) for k in numbers for winner in winners for engine in engines]
 
     def perform(self, winner: Winner, engine: str, number: int) -> Drive:
-        """Return a drive that is kept, or drive and keep it."""
-        path = self._folder / f"{winner.name}_{engine}_{number}.json"
-        mark = {"program": winner.sha256, "instrument": instrument()}
+        """Return a drive that is kept, or drive and keep it; winners of the same program share theirs."""
+        course = self._floors[winner.course].name
+        path = self._folder / f"{winner.sha256[:16]}_{course}_{engine}_{number}.json"
+        mark = {"program": winner.sha256, "limit_s": winner.limit_s, "instrument": instrument(engine)}
         kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
         if {name: kept.pop(name, "") for name in mark} == mark:
             return Drive(**kept)
@@ -99,9 +100,9 @@ def robot_class(engine: str) -> Callable[[Variation], Robot]:
 
 
 @cache
-def instrument() -> str:
+def instrument(engine: str) -> str:
     """Return a hash of everything that decides a drive but the program: a drive made by another is made again."""
-    digest = hashlib.sha256("".join(f"{name} {version(name)}\n" for name in ENGINES).encode())
+    digest = hashlib.sha256(f"{engine} {version(engine)}\n".encode())
     for source in _SOURCES:
         digest.update(source.read_bytes())
     return digest.hexdigest()

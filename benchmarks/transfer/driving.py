@@ -19,7 +19,7 @@ Row = tuple[int, ...]
 TICK_S = 0.001  # commands, sensor and referee act at 1 kHz
 TIME_LIMIT_S = 60.0
 SENSOR_AHEAD = 0.081  # m, of the axle's centre
-PATH_TICKS = 50  # a path has a row every 50 ms
+PATH_TICKS = 20  # a path has a row every 20 ms
 
 MOTOR, MOTOR_UNTIL, TEST, JUMP = range(4)
 _COMPARE: tuple[Callable[[float, float], bool], ...] = (
@@ -60,7 +60,7 @@ class Drive:
     time_s
         When it ended [s].
     path
-        ``t_s, x_m, y_m, heading_rad`` every 50 ms, and at the end (rows, 4).
+        ``t_s, x_m, y_m, heading_rad`` every 20 ms, and at the end (rows, 4).
     """
 
     outcome: str

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path as Outline
 from shapely.geometry.base import BaseGeometry
 
 from benchmarks.transfer.drives import ENGINES, Key
@@ -25,7 +27,7 @@ COLOURS = {"mujoco": BLUE, "pybullet": VERMILION}
 
 def paths_of(winner: Winner, drives: Mapping[Key, Drive], engines: Sequence[str]) -> dict[str, Path2D]:
     """Return the nominal drives' paths by name, ``t_s, x_m, y_m, heading_rad`` (rows, 4)."""
-    trace = winner.in_gecar().trace
+    trace = winner.in_gecar().trace or {}
     ours = np.column_stack([trace[name] for name in ("t_s", "x_m", "y_m", "heading_rad")])
     return {"gecar": ours} | {
         ENGINES[engine]: np.array(drives[winner.name, engine, 0].path) for engine in engines
@@ -56,7 +58,7 @@ def draw_transfer(
         course.legend(loc="center", ncols=3)
         course.set_title(f"{shown.name}: the nominal robot's way")
         _draw_times(times, winners, drives, engines)
-        parts = [f"{_counted(winners, drives, engine)} in {ENGINES[engine]}" for engine in engines]
+        parts = [f"{score(winners, drives, engine).at_goal} in {ENGINES[engine]}" for engine in engines]
         headline(
             figure,
             f"Of {len(winners)} winners, at GOAL: {', '.join(parts)}",
@@ -75,10 +77,7 @@ def draw_floor(axes: Axes, floor: Floor) -> None:
                 (column * edge, row * edge), edge, edge, facecolor=colour, edgecolor=FAINT, linewidth=0.6
             )
         )
-    for outline, inside in _rings(floor.line):
-        axes.fill(outline[:, 0], outline[:, 1], color="#C3CBD3", linewidth=0, zorder=1)
-        for hole in inside:
-            axes.fill(hole[:, 0], hole[:, 1], color="white", linewidth=0, zorder=1)
+    axes.add_patch(PathPatch(_outline(floor.line), facecolor="#C3CBD3", linewidth=0, zorder=1))
     margin = 0.03
     axes.set_xlim(-margin, floor.size[0] * edge + margin)
     axes.set_ylim(-margin, floor.size[1] * edge + margin)
@@ -88,12 +87,11 @@ def draw_floor(axes: Axes, floor: Floor) -> None:
     axes.text(goal_x, goal_y, "GOAL", size=7, color=SOFT)
 
 
-def _rings(line: BaseGeometry) -> list[tuple[Path2D, list[Path2D]]]:
-    shapes = getattr(line, "geoms", [line])
-    return [
-        (np.array(shape.exterior.coords), [np.array(hole.coords) for hole in shape.interiors])
-        for shape in shapes
-    ]
+def _outline(line: BaseGeometry) -> Outline:
+    """Turn the line into a path whose inner rings are holes."""
+    shapes = [shapely.orient_polygons(shape) for shape in getattr(line, "geoms", [line])]
+    rings = [ring for shape in shapes for ring in (shape.exterior, *shape.interiors)]
+    return Outline.make_compound_path(*(Outline(np.array(ring.coords), closed=True) for ring in rings))
 
 
 def _draw_times(
@@ -133,17 +131,11 @@ def _draw_engine(axes: Axes, winner: Winner, drives: Mapping[Key, Drive], engine
     )
 
 
-def _counted(winners: Sequence[Winner], drives: Mapping[Key, Drive], engine: str) -> str:
-    return str(score(winners, drives, engine).at_goal)
-
-
 def _detail(winners: Sequence[Winner], drives: Mapping[Key, Drive], engines: Sequence[str]) -> str:
-    parts = []
-    for engine in engines:
-        counted = score(winners, drives, engine)
-        near = f"{ENGINES[engine]}: {counted.near} within {100 * NEAR:.0f} % of the promised time"
-        varied = (
-            f", {counted.varied_at_goal} of {counted.varied} varied robots at GOAL" if counted.varied else ""
-        )
-        parts.append(near + varied)
-    return "; ".join(parts)
+    counts = [score(winners, drives, engine) for engine in engines]
+    near = " and ".join(str(counted.near) for counted in counts)
+    text = f"within {100 * NEAR:.0f} % of the promised time: {near}"
+    if any(counted.varied for counted in counts):
+        varied = " and ".join(f"{counted.varied_at_goal} of {counted.varied}" for counted in counts)
+        text += f"; varied robots at GOAL: {varied}"
+    return text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,8 @@ class Winner:
         Of the run; the file that says so.
     course, limit_s
         Where it was evolved to drive, and for how long at most [s].
+    gecar
+        What else of its configuration decides how gecar drives it.
     program, sha256
         Its text and that text's hash.
     fitness_s
@@ -41,6 +43,7 @@ class Winner:
     source: str
     course: str
     limit_s: float
+    gecar: dict[str, Any]
     program: str
     sha256: str
     fitness_s: float
@@ -54,7 +57,9 @@ class Winner:
 
     def in_gecar(self) -> Drive:
         """Drive it on gecar's nominal robot, with its path."""
-        world = load_task(configure({"course": self.course, "time_limit_s": self.limit_s})).world
+        world = load_task(
+            configure({"course": self.course, "time_limit_s": self.limit_s, **self.gecar})
+        ).world
         return simulate(world, parse_program(self.program).opcodes, trace=True)
 
 
@@ -111,7 +116,9 @@ def _runs(place: Path) -> list[tuple[str, Path, Mapping[str, Any], Mapping[str, 
     folder = place / "runs" if (place / "runs").is_dir() else place
     files = [place] if place.is_file() else sorted(folder.glob("*.json"))
     records = [(path, _read(path)) for path in files]
-    kept = [(path.stem, path, record["config"], record) for path, record in records if "config" in record]
+    kept: list[tuple[str, Path, Mapping[str, Any], Mapping[str, Any]]] = [
+        (path.stem, path, record["config"], record) for path, record in records if "config" in record
+    ]
     if not kept:
         raise expected(place, "no run", "a run's folder, a study's, or a study's record")
     return kept
@@ -138,10 +145,10 @@ def _winner(name: str, path: Path, table: Mapping[str, Any], record: Mapping[str
     if not solved:
         raise expected(path, "a program that did not reach GOAL", "one that promises a time")
     sha256 = hashlib.sha256(program.encode()).hexdigest()
-    winner = Winner(name, str(path), course, limit_s, program, sha256, fitness_s, 0.0)
+    gecar = {field: table[field] for field in ("step_s", "engine") if field in table}
+    winner = Winner(name, str(path), course, limit_s, gecar, program, sha256, fitness_s, 0.0)
     driven = winner.in_gecar()
     if driven.outcome != Outcome.GOAL:
-        raise expected(
-            path, f"a program that ends in {driven.outcome} here", "one that reaches GOAL in gecar"
-        )
-    return Winner(**{**asdict(winner), "promised_s": round(float(driven.time_s), 6)})
+        ending = Outcome(driven.outcome).name.lower()
+        raise expected(path, f"a program that ends here with {ending}", "one that reaches GOAL in gecar")
+    return replace(winner, promised_s=round(float(driven.time_s), 6))

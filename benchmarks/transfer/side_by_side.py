@@ -69,12 +69,13 @@ class _Stage:
                 draw_floor(axes, floor)
                 axes.set_title(name)
             figure.suptitle(
-                f"{winner.name}: the same program in {len(names)} simulations", ha="left", x=0.012, size=10
+                f"{winner.name}: one program, {len(names)} simulations", ha="left", x=0.006, size=10
             )
-            figure.set_dpi(80 * _FINE)
+            figure.set_dpi(90 * _FINE)
             canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            self._empty = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+            canvas.draw()  # type: ignore[no-untyped-call]
+            pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+            self._empty = Image.fromarray(pixels).convert("RGB")
         self._axes: dict[str, Axes] = dict(zip(names, several, strict=True))
 
     def frame(
@@ -99,7 +100,7 @@ class _Stage:
         outline = [tuple(spot) for spot in self._places(name, np.array(_OUTLINE) @ turn + (x, y))]
         ((eye_x, eye_y),) = self._places(name, np.array([[SENSOR_AHEAD, 0.0]]) @ turn + (x, y))
         pen.line(trail, fill=colour, width=2 * _FINE, joint="curve")
-        pen.polygon(outline, outline=colour, width=2 * _FINE)
+        pen.polygon(outline, fill="white", outline=colour, width=2 * _FINE)
         reach = 2 * _FINE
         pen.ellipse((eye_x - reach, eye_y - reach, eye_x + reach, eye_y + reach), fill=colour)
 

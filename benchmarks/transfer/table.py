@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def table(winners: Sequence[Winner], drives: Mapping[Key, Drive], engines: Seque
 
 
 def _line(winner: Winner, drives: Mapping[Key, Drive], engines: Sequence[str]) -> list[str]:
-    cells = [winner.name, winner.course, f"{winner.promised_s:.2f}"]
+    cells = [winner.name, Path(winner.course).stem, f"{winner.promised_s:.2f}"]
     for engine in engines:
         made, varied = drives[winner.name, engine, 0], varied_drives(winner, drives, engine)
         late = made.time_s / winner.promised_s - 1.0
