@@ -31,6 +31,11 @@ from gecar.world.course import load_course
 
 SOURCES = sorted((Path(__file__).parents[1] / "benchmarks" / "transfer").glob("*.py"))
 COURSES = ("paper", "chicane", "figure_eight", "gaps", "hairpin", "maze", "s_bends")
+NESTED = """
+if(SensorValue < 20) { motor_until(7,8,50,SensorValue > 80) }
+else { if(SensorValue > 90) { motor(4,4,2) } else { motor(2,2,1) } }
+motor(0,0,0)
+"""
 FOLLOWER = "if(SensorValue > 50) { motor(50,70,10) } else { motor(60,-50,10) }"
 
 
@@ -126,8 +131,7 @@ def test_course_with_obstacles_is_refused():
         "if(SensorValue > 50) { motor(1,2,10) } else { motor(3,4,25) }",
         "motor(9,9,7) if(SensorValue > 30) { if(SensorValue < 70) { motor(1,2,10) } motor(5,6,3) }",
         "motor_until(7,8,100,SensorValue < 40) motor_until(3,3,20,SensorValue > 60) motor(1,1,5)",
-        "if(SensorValue < 20) { motor_until(7,8,50,SensorValue > 80) } "
-        "else { if(SensorValue > 90) { motor(4,4,2) } else { motor(2,2,1) } } motor(0,0,0)",
+        NESTED,
     ],
 )
 def test_two_interpreters_do_the_same(text):
@@ -178,11 +182,10 @@ def test_each_variation_is_felt(engine, robot, change, moves):
 def test_sensor_reads_between_its_own_black_and_white():
     floor, levels = load_floor("paper"), Variation(white_pct=90.0, black_pct=5.0)
     on_line, on_floor = (0.15, 0.75 - 0.081, math.pi / 2), (0.30, 0.30, 0.0)
-    assert [Eye(floor, seen).read(on_line) for seen in (NOMINAL, levels)] == [0, 5]
-    assert [Eye(floor, seen).read(on_floor) for seen in (NOMINAL, levels)] == [100, 90]
-    noisy = [
-        Eye(floor, Variation(noise_pct=1.0, seed=k)).read((0.1375, 0.669, math.pi / 2)) for k in range(50)
-    ]
+    assert [Eye(floor, seen).read(0, on_line) for seen in (NOMINAL, levels)] == [0, 5]
+    assert [Eye(floor, seen).read(0, on_floor) for seen in (NOMINAL, levels)] == [100, 90]
+    edge = (0.1375, 0.669, math.pi / 2)
+    noisy = [Eye(floor, Variation(noise_pct=1.0, seed=k)).read(0, edge) for k in range(50)]
     assert 0.5 < np.std(noisy) < 2.0
 
 
@@ -211,12 +214,14 @@ def test_slow_follower_arrives_when_gecar_promises(tmp_path, engine, monkeypatch
     start = '[start]\ntile = [0, 0]\nheading = "up"\nleft_m = -0.025\n'
     corner.write_text(f'map = """\nF---\n|###\n"""\ngoal = [3, 1]\n{start}')
     run, out = run_folder(tmp_path / "slow", course=str(corner)), tmp_path / "out"
-    asked = [str(run), "--out", str(out), "--variations", "1", "--engines", engine]
+    asked = [str(run), "--out", str(out), "--variations", "1", "--engines", engine, "--no-pictures"]
     assert command.main(asked) == 0
     assert "1/1 within 3 %" in capsys.readouterr().out
-    assert all((out / name).stat().st_size < 5e6 for name in ("table.md", "transfer.png", "transfer.gif"))
     monkeypatch.setattr(keeping, "drive", lambda *_: pytest.fail("a kept drive was driven again"))
-    assert command.main([*asked, "--no-pictures"]) == 0
+    assert command.main(asked) == 0
+    if engine == "mujoco":
+        assert command.main(asked[:-1]) == 0
+        assert all(0 < (out / name).stat().st_size < 5e6 for name in ("transfer.png", "transfer.gif"))
 
 
 def test_drive_by_another_instrument_is_made_again(tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ import math
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -131,10 +132,15 @@ class Eye:
     def __init__(self, floor: Floor, variation: Variation) -> None:
         self._floor, self._variation = floor, variation
         self._rng = np.random.default_rng(variation.seed)
+        self._read_at, self._reading = -1, 0
 
-    def read(self, pose: Pose) -> int:
-        """Read the floor from where the robot stands."""
-        x, y, heading = pose
+    def read(self, tick: int, pose: Pose) -> int:
+        """Read the floor at a time [ms] from where the robot stands; at one time it reads but once."""
+        if tick != self._read_at:
+            self._read_at, self._reading = tick, self._look(*pose)
+        return self._reading
+
+    def _look(self, x: float, y: float, heading: float) -> int:
         seen = self._variation
         light = 1.0 - self._floor.line_share(
             x + SENSOR_AHEAD * math.cos(heading), y + SENSOR_AHEAD * math.sin(heading)
@@ -195,7 +201,7 @@ def drive(
     for tick in range(round(limit_s / TICK_S)):
         pose = robot.pose()
         ended = referee.watch(pose)
-        duties = None if ended else program.turn(tick, lambda pose=pose: eye.read(pose))  # type: ignore[misc]
+        duties = None if ended else program.turn(tick, partial(eye.read, tick, pose))
         if duties is None or tick % PATH_TICKS == 0:
             path.append([round(value, 5) for value in (tick * TICK_S, *pose)])
         if duties is None:
