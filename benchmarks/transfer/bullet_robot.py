@@ -27,7 +27,7 @@ ROLL_INERTIA, PITCH_INERTIA = 0.0018, 0.0028  # kg m^2, of the chassis; hardly f
 
 # The floor as a spring and damper under each contact: the robot sinks by 0.1 mm, and does not bounce.
 CONTACT_STIFFNESS, CONTACT_DAMPING = 2.0e4, 100.0  # N / m, N s / m
-STEP_S = 0.001
+STEP_S = 0.0005  # at 0.001 a program on the edge of two ways to follow the line can take the other one
 _WHEELS = (0, 1)
 
 
