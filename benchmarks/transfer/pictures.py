@@ -55,7 +55,7 @@ def draw_transfer(
         for name, line in paths_of(shown, drives, engines).items():
             style = {"linestyle": (0, (4, 2)), "linewidth": 1.2} if name == "gecar" else {"linewidth": 1.4}
             course.plot(line[:, 1], line[:, 2], color=colours[name], label=name, **style)
-        course.legend(loc="center", ncols=3)
+        course.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=3)
         course.set_title(f"{shown.name}: the nominal robot's way")
         _draw_times(times, winners, drives, engines)
         parts = [f"{score(winners, drives, engine).at_goal} in {ENGINES[engine]}" for engine in engines]

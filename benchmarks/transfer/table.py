@@ -94,12 +94,15 @@ def _line(winner: Winner, drives: Mapping[Key, Drive], engines: Sequence[str]) -
         made, varied = drives[winner.name, engine, 0], varied_drives(winner, drives, engine)
         late = made.time_s / winner.promised_s - 1.0
         cells += (
-            [f"{made.time_s:.2f}", f"{100 * late:+.1f} %"]
+            [f"{made.time_s:.2f}", f"{round(100 * late, 1) + 0.0:+.1f} %"]
             if made.at_goal
             else [f"{WORDS[made.outcome]} at {made.time_s:.2f}", "-"]
         )
         times = [each.time_s for each in varied if each.at_goal]
-        cells += [f"{len(times)}/{len(varied)}", f"{np.median(times):.2f}" if times else "-"]
+        cells += [
+            f"{len(times)}/{len(varied)}" if varied else "-",
+            f"{np.median(times):.2f}" if times else "-",
+        ]
     return cells
 
 
@@ -107,11 +110,11 @@ def _sum(winners: Sequence[Winner], drives: Mapping[Key, Drive], engines: Sequen
     cells = [f"all {len(winners)}", "", ""]
     for engine in engines:
         counted = score(winners, drives, engine)
-        share = f" ({100 * counted.varied_at_goal / counted.varied:.0f} %)" if counted.varied else ""
+        share = 100 * counted.varied_at_goal / max(counted.varied, 1)
         cells += [
             f"{counted.at_goal}/{len(winners)} at GOAL",
             f"{counted.near}/{len(winners)} within {100 * NEAR:.0f} %",
-            f"{counted.varied_at_goal}/{counted.varied}{share}",
+            f"{counted.varied_at_goal}/{counted.varied} ({share:.0f} %)" if counted.varied else "-",
             "",
         ]
     return cells
