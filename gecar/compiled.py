@@ -87,7 +87,9 @@ def kernel(function: F) -> F:
     Numba counts, atomically, whenever an array is taken out of a tuple: a third of the time of a simulated drive.
     """
     njit: Any = numba.njit  # whose types do not know _nrt
-    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)(function)
+    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)(
+        function
+    )
     return dispatcher
 
 

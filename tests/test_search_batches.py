@@ -42,7 +42,9 @@ class Mortal:
     mark: Path
     always: bool = False
 
-    def __call__(self, programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float, _generation: int) -> Scores:
+    def __call__(
+        self, programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float, _generation: int
+    ) -> Scores:
         if programs and (self.always or not self.mark.exists()):
             self.mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -53,7 +55,9 @@ class Mortal:
 class Faulty:
     """An evaluator with a fault."""
 
-    def __call__(self, _programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float, _generation: int) -> Scores:
+    def __call__(
+        self, _programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float, _generation: int
+    ) -> Scores:
         raise ZeroDivisionError
 
 
