@@ -33,7 +33,7 @@ def standing_of(world: World, drive: Drive) -> str:
     """Say how far a drive came, and how its time stands beside the lower bound and the paper's best."""
     bound = world.course.lower_bound_s(world.robot)
     words = f"{drive.checkpoints} of {len(world.course.sequence) - 1} checkpoints; "
-    words += f"lower bound {bound:.2f} s, which no program can beat{_above(drive, bound)}"
+    words += f"lower bound {bound:.2f} s{_above(drive, bound)}"
     reference = reference_s(world.course, world.robot)
     if reference is not None:
         words += f"; the fastest drive an optimiser found {reference:.2f} s{_above(drive, reference)}"
