@@ -89,7 +89,12 @@ def show(
     voice.say(
         f"{each['width_m']:g} x {each['height_m']:g} m, {each['checkpoints']} checkpoints, "
         f"line {each['line_m']:.2f} m, shortest way {each['shortest_way_m']:.2f} m; "
-        f"no program is faster than {each['lower_bound_s']:.2f} s."
+        f"no program is faster than {each['lower_bound_s']:.2f} s"
+        + (
+            f", the fastest drive an optimiser found takes {each['reference_s']:.2f} s."
+            if each["reference_s"]
+            else "."
+        )
     )
     if picture is not None:
         voice.say(f"Picture: {picture}")
@@ -167,6 +172,8 @@ def new(
 
 def facts(loaded: Course, robot: Robot) -> dict[str, Any]:
     """Return a course's figures, ready for JSON."""
+    from gecar.world.reference import reference_s
+
     return {
         "title": loaded.title or loaded.name,
         "columns": loaded.columns,
@@ -177,6 +184,7 @@ def facts(loaded: Course, robot: Robot) -> dict[str, Any]:
         "checkpoints": len(loaded.checkpoints),
         "shortest_way_m": loaded.shortest.length_m,
         "lower_bound_s": loaded.lower_bound_s(robot),
+        "reference_s": reference_s(loaded, robot),
         "walls": len(loaded.walls),
         "obstacles": len(loaded.obstacles),
     }

@@ -26,6 +26,8 @@ def rough_search(
     rng: np.random.Generator,
     generations: int = 22,
     wider: int = 1,
+    patience: int = PATIENCE,
+    mentioned: float = MENTIONED,
 ) -> tuple[Array, float]:
     """Return the best vector met, and its cost.
 
@@ -43,11 +45,13 @@ def rough_search(
         Of 7 + 3 ln(k) trials each.
     wider
         Times so many trials, where there are many valleys.
+    patience, mentioned
+        Generations without a gain of so much cost, after which the search ends.
     """
     trials = wider * (7 + int(3 * math.log(len(start))) if len(start) > 1 else 6)
     strategy = _Strategy(len(start), trials)
     best, least = np.clip(start, *bounds), cost(np.clip(start, *bounds))
-    mentioned, since = least, 0
+    last, since = least, 0
     for _ in range(generations):
         steps = strategy.ask(rng)
         places = np.clip(start + spread * (strategy.mean + strategy.sigma * steps), *bounds)
@@ -56,9 +60,9 @@ def rough_search(
         if found[order[0]] < least:
             best, least = places[order[0]], float(found[order[0]])
         since += 1
-        if least < mentioned - MENTIONED:
-            mentioned, since = least, 0
-        if since >= PATIENCE:
+        if least < last - mentioned:
+            last, since = least, 0
+        if since >= patience:
             break
         strategy.tell(steps[order])
     return best, least

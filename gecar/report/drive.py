@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gecar.world.course import Course
+from gecar.world.reference import reference_s
 from gecar.world.rollout import Drive, Outcome, World
 
 PAPER_BEST_S = 16.74
@@ -56,12 +57,20 @@ def standing_of(world: World, drive: Drive) -> str:
     """Say how far a drive came, and how its time stands beside the lower bound and the paper's best."""
     bound = world.course.lower_bound_s(world.robot)
     words = f"{drive.checkpoints} of {len(world.course.sequence) - 1} checkpoints; "
-    words += f"lower bound {bound:.2f} s, which no program can beat"
-    if drive.outcome == Outcome.GOAL:
-        words += f" ({100 * (drive.time_s / bound - 1):.0f} % above it)"
+    words += f"lower bound {bound:.2f} s{_above(drive, bound)}"
+    reference = reference_s(world.course, world.robot)
+    if reference is not None:
+        words += f"; the fastest drive an optimiser found {reference:.2f} s{_above(drive, reference)}"
     if world.course.name == "paper":
         words += f"; the paper's best {PAPER_BEST_S} s"
     return words + "."
+
+
+def _above(drive: Drive, time_s: float) -> str:
+    if drive.outcome != Outcome.GOAL:
+        return ""
+    share = 100.0 * (drive.time_s / time_s - 1.0)
+    return f" ({abs(share):.0f} % {'above' if share >= 0.0 else 'below'} it)"
 
 
 def detail_of(world: World, drive: Drive) -> str:
@@ -89,6 +98,7 @@ def drive_table(world: World, drive: Drive) -> dict[str, Any]:
         "checkpoints_of": len(world.course.sequence) - 1,
         "arrival_s": [None if np.isnan(t) else round(float(t), 6) for t in drive.arrival_s],
         "lower_bound_s": round(world.course.lower_bound_s(world.robot), 4),
+        "reference_s": reference_s(world.course, world.robot),
         "course": world.course.name,
         "robot": world.robot.name,
         "engine": "pymunk" if world.uses_pymunk else "inline",

@@ -145,7 +145,8 @@ class Course:
 
     def lower_bound_s(self, robot: Robot) -> float:
         """Return a time to GOAL [s] no program on this robot can beat; see `gecar.world.lower_bound`."""
-        return fastest_time(self.shortest.length_m, robot)
+        free_to_turn = len(self.walls) == 0 and not self.obstacles
+        return fastest_time(self.shortest, self.start.heading_rad, robot, free_to_turn)
 
     def distance_to_line(self, x_m: npt.ArrayLike, y_m: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Return the distance of points [m] to the middle of the nearest line as drawn; nan without one."""

@@ -23,6 +23,7 @@ from shapely.geometry import LineString, Point
 from gecar.world.layout import Layout
 from gecar.world.order import tile_route
 from gecar.world.tiles import Side
+from gecar.world.turning import Leg, legs_of
 
 Place = tuple[float, float]
 _EPS = 1e-12
@@ -36,10 +37,11 @@ class Portal(NamedTuple):
 
 
 class ShortestWay(NamedTuple):
-    """The shortest way [m]: where it leads, straight over jumps; and the length no way can undercut."""
+    """The shortest way [m]: where it leads, straight over jumps; the length no way can undercut; its straight legs."""
 
     path: LineString
     length_m: float
+    legs: tuple[Leg, ...]
 
 
 def shortest_way(layout: Layout, start: int, sequence: Sequence[int], x_m: float, y_m: float) -> ShortestWay:
@@ -55,13 +57,14 @@ def shortest_way(layout: Layout, start: int, sequence: Sequence[int], x_m: float
         START, on its tile [m].
     """
     size = layout.tile_size_m
-    first, *rest = _parts(layout, _with_tiles_between(layout, start, sequence))
-    ways = [_pull_tight([_portal(layout, a, b) for a, b in pairwise(first)], (x_m / size, y_m / size))]
-    ways += [_pull_tight([_portal(layout, a, b) for a, b in pairwise(part)]) for part in rest]
-    jumps = [layout.square(a[-1]).distance(layout.square(b[0])) for a, b in pairwise([first, *rest])]
+    parts = _parts(layout, _with_tiles_between(layout, start, sequence))
+    portals = [[_portal(layout, a, b) for a, b in pairwise(part)] for part in parts]
+    ways = [_pull_tight(portals[0], (x_m / size, y_m / size)), *map(_pull_tight, portals[1:])]
+    jumps = [layout.square(a[-1]).distance(layout.square(b[0])) for a, b in pairwise(parts)]
+    legs = [leg for part, way in zip(parts, ways, strict=True) for leg in legs_of(layout, part, way)]
     points = [(x * size, y * size) for way in ways for x, y in way]
     length = sum(jumps) + size * sum(math.dist(a, b) for way in ways for a, b in pairwise(way))
-    return ShortestWay(LineString(points if len(points) > 1 else points * 2), length)
+    return ShortestWay(LineString(points if len(points) > 1 else points * 2), length, tuple(legs))
 
 
 def _with_tiles_between(layout: Layout, start: int, sequence: Sequence[int]) -> list[int]:
