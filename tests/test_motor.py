@@ -3,8 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from gecar.world.bench import bench_step
 from gecar.world.robot import load_robot
 from gecar.world.shaft_speed import altered, settled_speeds
+from gecar.world.state import DERIVED, REGULATOR_RATE, STATE, derive, place
 
 EV3 = load_robot("ev3")
 
@@ -26,6 +28,37 @@ def test_told_a_speed_it_turns_ten_degrees_a_second_for_each_percent_up_to_the_l
     assert np.allclose(
         settled_speeds(altered(EV3, "speed"), (10, 55, 80, 100)), [100, 550, 800, 800], atol=0.5
     )
+
+
+def regulated_speeds(inertia_scale, step_s, command=0.5, seconds=1.5):
+    """The left shaft's speed after each step [rad/s], regulated, from rest."""
+    motor = EV3.motor.model_copy(update={"inertia": EV3.motor.inertia * inertia_scale})
+    physics = altered(EV3, "speed").model_copy(update={"motor": motor}).physics
+    (p,), (c,), (s,) = physics, np.zeros(1, DERIVED), np.zeros(1, STATE)
+    derive(p, step_s, c)
+    place(s, p, 0.0, 0.0, 0.0)
+    speeds = np.empty(round(seconds / step_s))
+    for k in range(len(speeds)):
+        bench_step(s, command, command, p, c)
+        speeds[k] = s["left_speed"]
+    return speeds
+
+
+@pytest.mark.parametrize("step_s", [0.00025, 0.002, 0.01])
+@pytest.mark.parametrize("inertia_scale", [1e-6, 1e-3, 0.03, 0.158, 0.16, 1.0, 4.0])
+def test_a_regulated_wheel_of_any_inertia_goes_the_right_way_and_settles_where_told(inertia_scale, step_s):
+    wanted = math.radians(500.0)
+    speeds = regulated_speeds(inertia_scale, step_s)
+    assert speeds.min() >= 0.0
+    assert speeds.max() < 1.1 * wanted
+    assert speeds[-1] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_regulator_answers_a_light_wheel_at_its_own_rate_whatever_the_step():
+    """Without inertia to shape it, the loop is one lag of 1 / REGULATOR_RATE."""
+    times = [np.argmax(regulated_speeds(1e-6, step) > (1 - 1 / math.e) * math.radians(500)) * step
+             for step in (0.00025, 0.002)]  # fmt: skip
+    assert np.allclose(times, 1.0 / REGULATOR_RATE, atol=0.005)
 
 
 def test_recordings_stand_beside_the_simulation(gecar, tmp_path):

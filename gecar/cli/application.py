@@ -19,7 +19,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from gecar import __version__
 
-EVOLVE, COURSES, ROBOT = "Evolve", "Courses and grammars", "The real robot"
+EVOLVE, COURSES, ROBOT = "Evolve", "Courses, robots and grammars", "The real robot"
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,7 @@ SEATS = (
     Seat("table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"),
     Seat("check", EVOLVE, "Compare a table of fitness figures with a fresh run.", "check:check"),
     Seat("course", COURSES, "List, show, print and make courses.", "course:course"),
+    Seat("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
     Seat("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     Seat("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
     Seat("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),

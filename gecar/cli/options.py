@@ -15,7 +15,7 @@ CourseOption = Annotated[
 ]  # fmt: skip
 RobotOption = Annotated[
     str | None,
-    typer.Option("--robot", metavar="NAME|FILE", help="Who drives: ev3, or a robot file (.toml).",
+    typer.Option("--robot", metavar="NAME|FILE", help="Who drives; [bold]gecar robot list[/] names them.",
                  show_default="ev3", rich_help_panel=WORLD),
 ]  # fmt: skip
 NoiseOption = Annotated[

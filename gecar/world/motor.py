@@ -99,8 +99,9 @@ def slewed(duty: float, last: float, c: Any) -> float:
 def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
     """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
 
-    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant; the
-    integral stops where the duty saturates. The brick's own gains are not published in these terms.
+    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant, without
+    a proportional part where the motor is quicker than that (`gecar.world.state`); the integral stops where the duty
+    saturates. The brick's own gains are not published in these terms.
     """
     error = command * FULL_SPEED - speed
     wanted = c.regulator_p * error + integral

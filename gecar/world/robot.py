@@ -19,6 +19,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Percent = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+_SHIPPED = Path(__file__).parent
 
 
 class _Section(BaseModel):
@@ -210,21 +211,38 @@ def read_robot(path: Path) -> Robot:
     return robot_from(read_toml(path, "a robot file"), path)
 
 
+def list_robots() -> list[str]:
+    """Return the names of the robots that ship with gecar, the nominal one first."""
+    names = sorted(path.stem for path in _SHIPPED.glob("*.toml"))
+    return sorted(names, key=lambda name: name != "ev3")
+
+
+def robot_file(name_or_path: str | Path) -> Path:
+    """Return the file of a robot: the one given, or the one of a robot that ships with gecar.
+
+    Raises
+    ------
+    InputError
+        If it is neither a robot file's name nor one of `list_robots`.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or is_file(path):
+        return path
+    if str(name_or_path) not in list_robots():
+        wanted = f"a robot file (.toml) or one of {', '.join(list_robots())}"
+        raise expected("--robot", f"'{name_or_path}'", wanted)
+    return _SHIPPED / f"{name_or_path}.toml"
+
+
 def load_robot(name_or_path: str | Path) -> Robot:
-    """Load a robot by file, or by the name of one that ships with gecar (``ev3``).
+    """Load a robot by file, or by the name of one that ships with gecar (`list_robots`).
 
     Raises
     ------
     InputError
         If there is no such robot, or its file is wrong.
     """
-    path = Path(name_or_path)
-    if path.suffix == ".toml" or is_file(path):
-        return read_robot(path)
-    shipped = Path(__file__).parent / f"{name_or_path}.toml"
-    if not is_file(shipped):
-        raise expected("--robot", f"'{name_or_path}'", "a robot file (.toml) or 'ev3'")
-    return read_robot(shipped)
+    return read_robot(robot_file(name_or_path))
 
 
 def write_robot(robot: Robot, path: Path) -> None:

@@ -88,11 +88,21 @@ def _rotor(p: Any, dt: float, c: Any) -> None:
     c.rotor = inertia * k / -math.expm1(-k)
     c.inv_rotor = 1.0 / c.rotor
     c.drive_gain = dt * p.torque_constant / (c.rotor * p.resistance)
-    # Plant: gain [rad/s per duty] and time constant [s] of a free shaft.
-    gain = p.voltage / p.back_emf_constant
-    tau = dt / k
-    c.regulator_p = (2.0 * REGULATOR_RATE * tau - 1.0) / gain
-    c.regulator_i = REGULATOR_RATE * REGULATOR_RATE * tau / gain * dt
+    _regulator(c.keep, c.drive_gain * p.voltage, dt, c)
+
+
+@compiled
+def _regulator(keep: float, gain: float, dt: float, c: Any) -> None:
+    """Set the gains of `gecar.world.motor.regulate` for a free shaft, w' = keep w + gain u.
+
+    With u = P e + I and I' = I + Q e the loop's poles have the sum 1 + keep - gain P and the product
+    keep - gain P + gain Q. Both are put at q = exp(-`REGULATOR_RATE` dt). A shaft faster than that, keep < 2 q - 1,
+    would need P < 0, and drive backwards at first: P is then 0 and only one pole is at q, the other nearer to 0.
+    """
+    pole = math.exp(-REGULATOR_RATE * dt)
+    other = min(pole, 1.0 + keep - pole)
+    c.regulator_p = (1.0 + keep - pole - other) / gain
+    c.regulator_i = (1.0 - pole) * (1.0 - other) / gain
 
 
 @kernel
