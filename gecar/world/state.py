@@ -91,7 +91,7 @@ def _rotor(p: Any, dt: float, c: Any) -> None:
     _regulator(c.keep, c.drive_gain * p.voltage, dt, c)
 
 
-@compiled
+@kernel
 def _regulator(keep: float, gain: float, dt: float, c: Any) -> None:
     """Set the gains of `gecar.world.motor.regulate` for a free shaft, w' = keep w + gain u.
 
