@@ -64,7 +64,7 @@ def evolve(
                 "16; paper: 1", "K"),
     ] = None,
     share: Annotated[
-        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.95")
+        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.97")
     ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,

@@ -94,7 +94,7 @@ class Settings(BaseModel):
     attempts: int = Field(10, ge=1, le=1_000)
     restart_after: int = Field(0, ge=0, le=1_000_000)
     draws: int = Field(1, ge=1, le=1_000)
-    arrival_share: Rate = 0.95
+    arrival_share: Rate = 0.97
 
     @model_validator(mode="after")
     def _fits(self) -> Settings:

@@ -157,7 +157,7 @@ def run_program(
     """
     if not _goes_on(program, k, s, p, dt, floor, eyes):
         return True
-    passes = 0
+    passes = 1 if k.row == 0 else 0
     while passes < 2:
         if k.row >= program.shape[0]:
             k.row = 0
