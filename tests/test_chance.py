@@ -1,0 +1,176 @@
+"""Fitness as a chance: what counts is arriving under conditions nobody knows, not one drive to the last digit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gecar.errors import InputError
+from gecar.language.grammar import load_grammar
+from gecar.language.mapping import Mapper
+from gecar.language.program import parse_program
+from gecar.results.running import arrives
+from gecar.search.batches import Batches
+from gecar.search.chance import (
+    MARGIN,
+    Arrivals,
+    add_drives,
+    arrivals,
+    chosen,
+    merit_of,
+    pool,
+    times_at_steps,
+    wants_more,
+)
+from gecar.search.evaluation import DriveEvaluator
+from gecar.search.evolution import Evolution, run
+from gecar.search.fitness import UNSOLVED, score_type
+from gecar.search.phenotypes import Phenotype
+from gecar.search.settings import Settings
+from gecar.world.course import load_course
+from gecar.world.perturbation import drawn_conditions
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Outcome, World, simulate
+
+WORLD = World(load_robot("ev3"), load_course("paper"))
+STEADY = parse_program("if(SensorValue > 75):\n    motor(50,60,10)\nelse:\n    motor(30,-60,10)").opcodes
+FRAGILE = parse_program("if(SensorValue > 55):\n    motor(80,90,10)\nelse:\n    motor(20,-80,30)").opcodes
+LEAVES = parse_program("motor(80,80,100)").opcodes
+
+
+def score_of(fitness, drawn, n=8):
+    score = np.zeros(1, score_type(0, n))[0]
+    score["fitness_s"], score["share"] = fitness, 0.5
+    score["drawn_s"] = [*drawn, *[np.nan] * (n - len(drawn))]
+    return score
+
+
+def test_the_merit_is_the_median_time_of_what_arrives_often_enough():
+    score = score_of(15.0, [16.0, 17.0, np.inf])
+    pool(score, 0.75)
+    assert score["merit_s"] == 16.0
+    pool(score, 0.9)
+    assert score["merit_s"] == UNSOLVED
+
+
+def test_credit_grows_with_arrivals_and_never_reaches_a_program_that_arrives_often_enough():
+    scores = [score_of(15.0, [np.inf] * k + [16.0] * (3 - k)) for k in (3, 2, 1)] + [
+        score_of(15.0, [16.0] * 3)
+    ]
+    for score in scores:
+        pool(score, 0.95)
+    shares = [float(score["share"]) for score in scores]
+    assert shares == sorted(shares)
+    assert shares[-2] < shares[-1] == 1.0
+
+
+def test_what_misses_goal_on_the_nominal_robot_has_less_credit_than_any_that_does_not():
+    missed, arrived = score_of(UNSOLVED, []), score_of(15.0, [np.inf])
+    pool(missed, 0.95)
+    pool(arrived, 0.95)
+    assert missed["share"] < arrived["share"]
+
+
+def test_drives_of_a_program_met_again_add_up_until_there_is_no_room():
+    score = score_of(15.0, [16.0, 16.0], n=4)
+    pool(score, 0.75)
+    assert wants_more(score)
+    add_drives(score, score_of(15.0, [18.0, np.inf], n=4), 0.75)
+    assert score["drawn_s"].tolist() == [16.0, 16.0, 18.0, np.inf]
+    assert not wants_more(score)
+
+
+def test_a_program_that_misses_too_often_is_not_driven_again():
+    score = score_of(15.0, [np.inf])
+    pool(score, 0.95)
+    assert not wants_more(score)
+
+
+def test_a_bad_program_costs_one_drive_and_a_slow_one_few():
+    evaluator = DriveEvaluator(WORLD, draws=16, required_share=0.95)
+    bad, steady = evaluator([LEAVES, STEADY], [1, 2])
+    assert bad["steps"] == simulate(WORLD, LEAVES).steps
+    assert np.isfinite(steady["drawn_s"]).sum() >= 15
+    (slow,) = evaluator([STEADY], [2], to_beat_s=steady["merit_s"] / MARGIN / 1.1)
+    assert np.isfinite(slow["drawn_s"]).sum() == 3
+
+
+def test_a_fragile_program_is_told_from_a_steady_one():
+    evaluator = DriveEvaluator(WORLD, draws=16)
+    fragile, steady = evaluator([FRAGILE, STEADY], [1, 2])
+    assert fragile["fitness_s"] < steady["fitness_s"] < UNSOLVED
+    assert steady["merit_s"] < UNSOLVED <= fragile["merit_s"]
+
+
+def test_every_generation_draws_afresh_and_the_same_one_alike():
+    evaluator = DriveEvaluator(WORLD, draws=4, seed=3)
+    first, again, later = (evaluator([STEADY], [1], math.inf, g)[0]["drawn_s"] for g in (0, 0, 1))
+    np.testing.assert_array_equal(first, again)
+    assert (first[:3] != later[:3]).all()
+
+
+def test_a_score_does_not_depend_on_the_programs_beside_it():
+    evaluator = DriveEvaluator(WORLD, draws=6)
+    together = evaluator([FRAGILE, STEADY, LEAVES], [1, 2, 3])[1]
+    alone = evaluator([STEADY], [2])[0]
+    assert together["merit_s"] == alone["merit_s"]
+
+
+def test_the_reported_share_is_of_200_drives_and_the_steps_are_the_nominal_robots():
+    told = arrives(WORLD, parse_program("motor(80,80,100)"), 1)
+    assert (told["share"], told["of"], told["median_s"]) == (0.0, 200, None)
+    assert set(told["steps"].values()) == {None}
+    assert times_at_steps(WORLD, STEADY)["0.002"] == simulate(WORLD, STEADY).time_s
+
+
+def test_the_choice_is_made_on_fresh_draws():
+    assert chosen(WORLD, [FRAGILE, LEAVES, STEADY], 0.95, 1) == 2
+
+
+def test_merit_orders_by_time_only_what_arrives_often_enough():
+    often, seldom = Arrivals(np.array([17.0] * 20)), Arrivals(np.array([15.0] * 10 + [np.inf] * 10))
+    assert merit_of(often, 0.9) == 17.0
+    assert merit_of(seldom, 0.9) > UNSOLVED
+
+
+def test_arrivals_under_the_same_seed_are_the_same():
+    one, other = arrivals(WORLD, [STEADY], 20, 5), arrivals(WORLD, [STEADY], 20, 5)
+    np.testing.assert_array_equal(one[0].times_s, other[0].times_s)
+
+
+def test_a_run_with_draws_goes_on_to_the_same_end():
+    settings = Settings(population=12, generations=3, codons=60, draws=4, checkpoint_credit=True)
+    mapper = Mapper(load_grammar("paper"))
+
+    def evolve(evolution):
+        with Batches(DriveEvaluator(WORLD, draws=4)) as batches:
+            run(evolution, batches)
+        return evolution
+
+    whole = evolve(Evolution(settings, mapper, 1))
+    begun = Evolution(settings, mapper, 1)
+    with Batches(DriveEvaluator(WORLD, draws=4)) as batches:
+        begun.tell(batches(begun.ask()))
+        begun.tell(batches(begun.ask()))
+    resumed = evolve(Evolution.resume(settings, mapper, begun.state()))
+    assert resumed.scores.tobytes() == whole.scores.tobytes()
+    assert resumed.best.genome.tolist() == whole.best.genome.tolist()
+
+
+def test_programs_that_differ_beyond_the_cap_are_one():
+    texts = ("motor(80,-100,50)", "motor(100,-80,50)", "motor(70,-80,50)")
+    capped = [Phenotype(parse_program(text), b"", duty_cap_pct=80).digest for text in texts]
+    assert capped[0] == capped[1] != capped[2]
+    assert len({Phenotype(parse_program(text), b"").digest for text in texts}) == 3
+
+
+def test_a_hysteresis_controller_polls_between_its_thresholds():
+    text = "if(SensorValue > 60){motor(40,60,0)}\nif(SensorValue < 40){motor(40,-20,0)}"
+    drive = simulate(World(WORLD.robot, WORLD.course, time_limit_s=3.0), parse_program(text).opcodes)
+    assert drive.outcome != Outcome.STUCK
+    assert drive.steps > 100
+
+
+def test_too_many_draws_are_refused():
+    with pytest.raises(InputError, match="found -1"):
+        drawn_conditions(WORLD, -1)
