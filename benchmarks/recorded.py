@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from gecar.reality.discovery import discover
-from gecar.reality.recording import read_case
-from gecar.reality.replay import Film
+from gecar.reality.recordings.recording import read_case
+from gecar.reality.replay.replayer import Film
 from gecar.reality.verdict import Found, Verdict
 
 BESIDE = Path(__file__).parents[2] / "shared" / "recordings"

@@ -7,8 +7,8 @@ import time
 import numpy as np
 
 from gecar.language.program import parse_program
-from gecar.reality.recording import Recording, make_recording
-from gecar.reality.replay import Film
+from gecar.reality.recordings.recording import Recording, make_recording
+from gecar.reality.replay.replayer import Film
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate

@@ -9,11 +9,11 @@ from trials import SENSOR_FREE, trial, weak_robot
 from gecar.errors import InputError
 from gecar.plots.calibration import calibration_figure
 from gecar.plots.style import is_whole
-from gecar.reality.calibration import BLIND, calibrate
-from gecar.reality.camera import corrected
-from gecar.reality.constants import CONSTANTS, chosen, with_constants
-from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
-from gecar.reality.setup import Setup
+from gecar.reality.calibrate.calibration import BLIND, calibrate
+from gecar.reality.calibrate.constants import CONSTANTS, chosen, with_constants
+from gecar.reality.recordings.camera_frame import corrected
+from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, write_recording
+from gecar.reality.recordings.setup import Setup
 from gecar.report.calibration import calibration_lines, calibration_table
 from gecar.world.robot import load_robot, read_robot
 
@@ -105,7 +105,7 @@ def test_a_constant_that_an_effect_holds_is_set_there():
 
 
 def filmed_askew(recording, mark, course):
-    """Return a recording whose camera's mark and frame are off, as `gecar.reality.camera` says."""
+    """Return a recording whose camera's mark and frame are off, as `gecar.reality.recordings.camera_frame` says."""
     (ahead, left, turn), (dx, dy, angle) = mark, course
     h = recording.heading_rad
     x = recording.x_m + ahead * np.cos(h) - left * np.sin(h)

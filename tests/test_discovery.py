@@ -22,20 +22,20 @@ from gecar import reality
 from gecar.errors import InputError
 from gecar.plots.discovery import verdict_figures
 from gecar.plots.style import picture
-from gecar.reality.described import with_formulas
 from gecar.reality.discovery import discover
-from gecar.reality.formula import NAMES, Formula, describe
-from gecar.reality.freedom import free
-from gecar.reality.holdout import Misfit, split
-from gecar.reality.noise import estimate_noise
-from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
-from gecar.reality.replay import Film
-from gecar.reality.rough_search import rough_search
-from gecar.reality.setup import Setup
-from gecar.reality.starts import starts
-from gecar.reality.strip import Strip
+from gecar.reality.fitting.initial_values import starts
+from gecar.reality.fitting.parameters import free
+from gecar.reality.invent.corrected_replay import with_formulas
+from gecar.reality.invent.formula import NAMES, Formula, describe
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.optimisation.cma_es import rough_search
+from gecar.reality.prove.holdout import Misfit, split
+from gecar.reality.prove.whiteness import whiteness
+from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, write_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.replayer import Film
+from gecar.reality.residuals.of_recording import Strip
 from gecar.reality.verdict import Judgement, Residual, Verdict
-from gecar.reality.whiteness import whiteness
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_page
 from gecar.world.effects import CATALOGUE

@@ -10,10 +10,10 @@ import pytest
 from test_discovery import EV3, recorded, verdict_on
 
 from gecar.reality.discovery import discover
-from gecar.reality.loudness import loudness, typical
-from gecar.reality.noise import estimate_noise
-from gecar.reality.recording import Case, Recording
-from gecar.reality.strip import Strip
+from gecar.reality.locate.misfit_energy import loudness, typical
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.residuals.of_recording import Strip
 from gecar.reality.verdict import Verdict
 from gecar.world.course import load_course
 from gecar.world.robot import Robot

@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from gecar.reality.recording import Recording, make_recording
-from gecar.reality.replay import Film, replay
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.recording import Recording, make_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.replayer import Film, replay
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")

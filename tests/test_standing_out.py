@@ -8,8 +8,8 @@ import numpy as np
 from test_discovery import EV3, recorded
 
 from gecar.reality.discovery import discover
-from gecar.reality.recording import Case, Recording
-from gecar.reality.standing_out import LIMIT, loudest_place
+from gecar.reality.locate.hotspot import LIMIT, loudest_place
+from gecar.reality.recordings.recording import Case, Recording
 
 KICK_RAD = 0.03
 

@@ -12,12 +12,12 @@ from test_location import seen_on_the_course
 from trials import ARRIVES, trial
 
 from gecar.reality.discovery import discover
-from gecar.reality.noise import estimate_noise
-from gecar.reality.odometry import odometry
-from gecar.reality.recording import Case, Recording
-from gecar.reality.replay import Film
-from gecar.reality.strip import Strip
-from gecar.reality.whereabouts import Whereabouts, bare_floor, find_start, moved, rebegun
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.replay.odometry import odometry
+from gecar.reality.replay.replayer import Film
+from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.start_pose.localise import Whereabouts, bare_floor, find_start, moved, rebegun
 from gecar.world.course import load_course
 from gecar.world.robot import Robot
 

@@ -20,8 +20,8 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
-from gecar.reality.calibration import Calibration, Fitted, Unknown
-from gecar.reality.identifiable import BLIND
+from gecar.reality.calibrate.calibration import Calibration, Fitted, Unknown
+from gecar.reality.calibrate.identifiability import BLIND
 
 ROW_IN = 0.27
 _POSE = ("x_m", "y_m", "heading_deg")

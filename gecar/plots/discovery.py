@@ -28,8 +28,8 @@ from gecar.plots.style import (
     new_figure,
 )
 from gecar.reality.evidence import Evidence
-from gecar.reality.loudness import STRETCH_S, stretch_errors
-from gecar.reality.strip import CHANNELS, Strip
+from gecar.reality.locate.misfit_energy import STRETCH_S, stretch_errors
+from gecar.reality.residuals.of_recording import CHANNELS, Strip
 from gecar.reality.verdict import Place, Verdict
 from gecar.world.course import load_course
 

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from gecar.plots.course import draw_course
 from gecar.plots.style import BLUE, ORANGE, SOFT, VERMILION, headline, look, new_figure
-from gecar.reality.following import HEADING, LEFT_ANGLE, LEFT_SPEED, RIGHT_ANGLE, X, Y
-from gecar.reality.freedom import free
-from gecar.reality.looking import look_along
-from gecar.reality.recording import make_recording
-from gecar.reality.replay import Film
-from gecar.reality.setup import Setup
+from gecar.reality.fitting.parameters import free
+from gecar.reality.recordings.recording import make_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, LEFT_SPEED, RIGHT_ANGLE, X, Y
+from gecar.reality.replay.reflectance import look_along
+from gecar.reality.replay.replayer import Film
 from gecar.world.course import Course
 from gecar.world.effects import BY_ID, Effect
 from gecar.world.robot import Robot
@@ -62,7 +62,7 @@ SHOWN: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class _Drive:
-    """What robot and sensors did: times [s], rows as `gecar.reality.following` lists them, and reflection [%]."""
+    """What robot and sensors did: times [s], rows as `gecar.reality.replay.kernel` lists them, and reflection [%]."""
 
     t: Array
     rows: Array

@@ -14,30 +14,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.alignment import fitted_offsets
-from gecar.reality.chain import Explanation, explain
-from gecar.reality.comparison import Comparison
-from gecar.reality.confusion import alternatives
-from gecar.reality.described import with_formulas
+from gecar.reality.advise.next_recording import suggest
+from gecar.reality.advise.notes import remarks
 from gecar.reality.evidence import Evidence
-from gecar.reality.fitting import cost
-from gecar.reality.formula import Formula, describe
-from gecar.reality.holdout import Misfit, Split, judge, split
-from gecar.reality.known_robot import known_robot
-from gecar.reality.levels import levelled
-from gecar.reality.limits import SIGHT, SIGHT_ON_A_DOUBTFUL_PATH
-from gecar.reality.location import Map
-from gecar.reality.next_recording import suggest
-from gecar.reality.noise import Noise, estimate_noise
-from gecar.reality.path_doubt import path_in_doubt
-from gecar.reality.recording import Case, Recording
-from gecar.reality.remarks import remarks
-from gecar.reality.selection import Selection
-from gecar.reality.strip import Strip
-from gecar.reality.uncertainty import intervals
+from gecar.reality.fitting.clock_offsets import fitted_offsets
+from gecar.reality.fitting.gain_offset import levelled
+from gecar.reality.invent.corrected_replay import with_formulas
+from gecar.reality.invent.formula import Formula, describe
+from gecar.reality.locate.mismatch_map import Map
+from gecar.reality.locate.path_check import path_in_doubt
+from gecar.reality.noise.sensor_noise import Noise, estimate_noise
+from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.prove.holdout import Misfit, Split, judge, split
+from gecar.reality.prove.whiteness import whiteness
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.residuals.of_case import Comparison
+from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.selection.alternatives import alternatives
+from gecar.reality.selection.selection import Selection
+from gecar.reality.selection.stepwise import Explanation, explain
+from gecar.reality.selection.thresholds import SIGHT, SIGHT_ON_A_DOUBTFUL_PATH
+from gecar.reality.selection.visible import visible, visible_to_sight
+from gecar.reality.uncertainty.intervals import intervals
 from gecar.reality.verdict import Found, Judgement, Residual, Verdict
-from gecar.reality.visible import visible, visible_to_sight
-from gecar.reality.whiteness import whiteness
 from gecar.world.course import Course, load_course
 from gecar.world.robot import Robot
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gecar.reality.chain import Explanation
-from gecar.reality.location import Map
-from gecar.reality.selection import Selection
-from gecar.reality.strip import Strip
+from gecar.reality.locate.mismatch_map import Map
+from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.selection.selection import Selection
+from gecar.reality.selection.stepwise import Explanation
 from gecar.world.robot import Robot
 
 

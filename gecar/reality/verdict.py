@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gecar.errors import expected
-from gecar.reality.holdout import Misfit
+from gecar.reality.prove.holdout import Misfit
 from gecar.world.robot import Robot
 
 if TYPE_CHECKING:

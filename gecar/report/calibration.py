@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gecar.reality.calibration import Calibration, Fitted
-from gecar.reality.holdout import Misfit
-from gecar.reality.identifiable import BLIND
+from gecar.reality.calibrate.calibration import Calibration, Fitted
+from gecar.reality.calibrate.identifiability import BLIND
+from gecar.reality.prove.holdout import Misfit
 
 
 def calibration_lines(result: Calibration) -> list[str]:

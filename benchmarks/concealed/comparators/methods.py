@@ -13,17 +13,17 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality import discovery
-from gecar.reality.blocks import Blocks
-from gecar.reality.chain import MOST_EFFECTS, Explanation
-from gecar.reality.fitting import cost, weights
-from gecar.reality.freedom import free
-from gecar.reality.known_robot import known_robot
-from gecar.reality.model import Effects, Model, Step, worthwhile
-from gecar.reality.replay import Film
-from gecar.reality.selection import Selection
-from gecar.reality.starts import starts
-from gecar.reality.strip import CHANNELS, Strip
-from gecar.reality.uncertainty import NORMAL_95, deviations
+from gecar.reality.fitting.initial_values import starts
+from gecar.reality.fitting.model import Effects, Model, Step, worthwhile
+from gecar.reality.fitting.parameters import free
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.optimisation.least_squares import cost, weights
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.replay.replayer import Film
+from gecar.reality.residuals.of_recording import CHANNELS, Strip
+from gecar.reality.selection.selection import Selection
+from gecar.reality.selection.stepwise import MOST_EFFECTS, Explanation
+from gecar.reality.uncertainty.intervals import NORMAL_95, deviations
 from gecar.reality.verdict import NextRecording
 
 Array = npt.NDArray[np.float64]

@@ -17,13 +17,13 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
 from gecar.reality.discovery import MEMORY_S
-from gecar.reality.freedom import Coordinate, free
-from gecar.reality.holdout import judge, split
-from gecar.reality.known_robot import known_robot
-from gecar.reality.noise import estimate_noise
-from gecar.reality.recording import Case, Recording
-from gecar.reality.strip import Strip
-from gecar.reality.uncertainty import NORMAL_95
+from gecar.reality.fitting.parameters import Coordinate, free
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove.holdout import judge, split
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.uncertainty.intervals import NORMAL_95
 from gecar.reality.verdict import Interval, Judgement
 from gecar.world.course import load_course
 from gecar.world.effects import CATALOGUE

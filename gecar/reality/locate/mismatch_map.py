@@ -1,0 +1,240 @@
+"""Where simulation and reality part: in which channel, in what motion, when, and at which place on the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import norm
+
+from gecar.reality.locate.hotspot import Spot
+from gecar.reality.locate.misfit_energy import loudness, typical
+from gecar.reality.locate.regimes import regime_masks
+from gecar.reality.residuals.of_recording import CHANNELS, Cells, Strip
+from gecar.reality.verdict import Place
+
+Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
+
+ON_THE_FLOOR = "place on the floor"
+BIN_S = 0.1
+SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happened there is felt
+SHIFTS = 499
+SURE = 0.05
+MOST = 8
+CLIP = 30.0
+WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
+FAINT = 0.02  # of the loudest channel's energy, of motion or of sight: less is not worth an entry
+PLACE_RADII_M = (0.1, 0.2, 0.3)
+SPAN_BINS = 2  # bins a span is made of
+LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
+SIGHT = 7
+GROUPS = ([0, 1], [2], [3], [4, 5, 6], [SIGHT])  # channels that one sensor measures: they are loud together
+POSE_GROUP, SIGHT_GROUP = 3, 4
+_GROUP = np.repeat(range(len(GROUPS)), [len(group) for group in GROUPS])
+
+
+class Map:
+    """Whitened energy of a case by channel, recording and time.
+
+    Parameters
+    ----------
+    strips
+        The recordings.
+    errors, cells
+        Residuals of motion of the robot as it was known, and where they come from.
+    before, after
+        Physics records of the robot as it was known, and with what was found; of sight, both know what was found to
+        move it, for its path is the same.
+    moved
+        Physics record with what was found to move the robot.
+    explained
+        Whether motion and sight are explained: then what an effect takes away is what it did; else all there is counts.
+    doubted
+        Whether what was seen speaks against the path, not the sensor: then the pose comes first.
+    spot
+        Where all that counts was left, if it is one place.
+
+    Attributes
+    ----------
+    energy
+        Summed squares of a bin's innovations, less noise, shape (channels, recordings, bins); 0 where nothing was
+        measured: it is high where an error begins. What was seen has no innovations: there it is what `loud` is.
+    loud
+        What a mismatch adds up to over a stretch (see `gecar.reality.locate.misfit_energy`), in variances of noise,
+        shape (groups of channels, recordings, spans).
+    masks
+        Regimes by name, each of shape (recordings, bins).
+    """
+
+    def __init__(
+        self,
+        strips: Sequence[Strip],
+        errors: Array,
+        cells: Cells,
+        before: Physics,
+        moved: Physics,
+        after: Physics,
+        explained: tuple[bool, bool] = (True, True),
+        doubted: bool = False,
+        spot: Spot | None = None,
+    ) -> None:
+        self.strips = tuple(strips)
+        self.bins = SPAN_BINS * max(int(s.film.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in strips)
+        shape = (len(CHANNELS), len(strips), self.bins)
+        total, count = np.zeros(shape), np.zeros(shape)
+        at = (cells.channel, cells.recording, np.minimum((cells.t_s / BIN_S).astype(int), self.bins - 1))
+        np.add.at(total, at, np.clip(errors, -CLIP, CLIP) ** 2 - 1.0)
+        np.add.at(count, at, 1.0)
+        loud, seen = self._loud(before, moved, after, explained)
+        total[SIGHT], count[SIGHT] = loud[SIGHT], seen[SIGHT]
+        self.masks, self.path = regime_masks(self.strips, before, self.bins, BIN_S)
+        counts = np.ones(self.path.shape[:2], bool) if spot is None else _around(self.path, spot)
+        loud = loud * counts
+        self.energy = np.where((count > 0) & counts, total, 0.0)
+        self.samples = count
+        self._motion_explained, self._doubted, self.spot = explained[0], doubted, spot
+        spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
+        self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
+
+    def _loud(
+        self, before: Physics, moved: Physics, after: Physics, explained: tuple[bool, bool]
+    ) -> tuple[Array, Array]:
+        """Return what a mismatch adds up to over a stretch, and the samples, by channel, recording and bin."""
+        sums = [loudness(s, before, moved, after, self.bins, BIN_S) for s in self.strips]
+        was, left, samples, added = (np.stack([one[k] for one in sums], axis=1) for k in range(4))
+        noise = typical(added, samples, explained[0])[:, None, None]
+        # Sight that needs no explanation is the path's noise; motion that needs none may still be told apart.
+        known = np.array(
+            [explained[0] and bool((was[:SIGHT] != left[:SIGHT]).any())] * SIGHT + [explained[1]]
+        )
+        taken = np.where(known[:, None, None], (was - left) / noise, was / noise - samples)
+        return np.where(samples > 0, taken, 0.0), samples
+
+    def places(self, rng: np.random.Generator) -> tuple[Place, ...]:
+        """Return where energy gathers more than chance lets it: the loudest sensor first, its most telling regime."""
+        excess = np.maximum(self.energy.sum(axis=(1, 2)), 0.0)
+        mean = excess / np.maximum(self.samples.sum(axis=(1, 2)), 1.0)
+        order = self._order()
+        found = []
+        most = np.where(np.arange(len(CHANNELS)) < SIGHT, excess[:SIGHT].max(), excess[SIGHT])
+        for channel in np.flatnonzero((mean > WORTH) & (excess > FAINT * most)):
+            entries = [self._judge(int(channel), name, mask, rng) for name, mask in self.masks.items()]
+            entries.append(self._spot(int(channel), rng))
+            group = order.index(_GROUP[channel])
+            found += [(group, excess[channel] * telling, place) for telling, place in filter(None, entries)]
+        if order and not any(group == 0 for group, _, _ in found):
+            last = self._throughout(max(GROUPS[order[0]], key=lambda k: excess[k]))
+            found += [(0, 0.0, last)] if last.p <= SURE else []
+        found.sort(key=lambda entry: (entry[0], -entry[1]))
+        return tuple(place for _, _, place in found[:MOST])
+
+    def _order(self) -> list[int]:
+        """Return the groups of channels that were measured, the loudest first.
+
+        Where motion itself is not explained, nor is the path to be trusted: what was seen along it comes last.
+        """
+        loud = self.loud.sum(axis=(1, 2))
+        if self._doubted or not self._motion_explained:
+            loud[SIGHT_GROUP] = loud.min() - 1.0
+        if self._doubted:
+            loud[POSE_GROUP] = loud.max() + 1.0
+        if (loud <= 0.0).all():
+            loud = np.array([self.energy[group].sum() for group in GROUPS])
+        there = [k for k, group in enumerate(GROUPS) if self.samples[group].any()]
+        return sorted(there, key=lambda k: -loud[k])
+
+    def _judge(
+        self, channel: int, name: str, mask: npt.NDArray[np.bool_], rng: np.random.Generator,
+        spot: tuple[float, float, float] | None = None,
+    ) -> tuple[float, Place] | None:  # fmt: skip
+        """Return how telling a regime is, and its entry; None where chance would do as well."""
+        energy = self.energy[channel]
+        whole = energy.sum()
+        there = mask & (self.samples[channel] > 0)
+        covered = there.sum() / max((self.samples[channel] > 0).sum(), 1)
+        if whole <= 0.0 or not 0.01 < covered < 0.9:
+            return None
+        inside = float(energy[mask].sum())
+        share = inside / whole
+        drawn = _shifted(energy, mask, rng)
+        p = float((1 + np.sum(drawn >= inside)) / (1 + SHIFTS))
+        if p > SURE or share <= covered:
+            return None
+        loud, spans = self._spans(channel)
+        place = Place(
+            CHANNELS[channel],
+            name,
+            round(float(min(share, 1.0)), 3),
+            p,
+            spans,
+            self.strips[loud].recording.name,
+            spot,
+        )
+        return float((share - covered) * np.sqrt(share)), place
+
+    def _spans(self, channel: int) -> tuple[int, tuple[tuple[float, float], ...]]:
+        """Return the recording in which a channel's sensor is loudest, and its loudest spans there."""
+        loud = np.maximum(self.loud[_GROUP[channel]], 0.0)
+        order = np.argsort(-loud, axis=None)
+        gathered = np.cumsum(loud.ravel()[order])
+        kept = np.zeros(loud.size, bool)
+        kept[order[: 1 + int(np.searchsorted(gathered, LOUDEST * gathered[-1]))]] = True
+        kept = kept.reshape(loud.shape)
+        loudest = int(np.argmax(np.where(kept, loud, 0.0).sum(axis=1)))
+        edges = np.flatnonzero(np.diff(np.r_[0, kept[loudest].astype(int), 0])) * SPAN_BINS * BIN_S
+        pairs = zip(edges[::2], edges[1::2], strict=True)
+        return loudest, tuple((round(float(a), 2), round(float(b), 2)) for a, b in pairs)
+
+    def _throughout(self, channel: int) -> Place:
+        """Return the entry of a channel that is off whatever the motion: the last resort."""
+        count = self.samples[channel].sum()
+        p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + SHIFTS))
+        loud, spans = self._spans(channel)
+        name = self.strips[loud].recording.name
+        if self.spot is None:
+            return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
+        return Place(CHANNELS[channel], ON_THE_FLOOR, 1.0, round(p, 3), spans, name, (*self.spot, SPOT_M))
+
+    def _spot(self, channel: int, rng: np.random.Generator) -> tuple[float, Place] | None:
+        """Return the disc on the floor that holds most energy beyond its share of the time."""
+        seen = ~np.isnan(self.path[:, :, 0]) & (self.samples[channel] > 0)
+        energy = self.energy[channel]
+        whole = energy[seen].sum()
+        if seen.sum() < 50 or whole <= 0.0:
+            return None
+        best: tuple[float, tuple[float, float, float]] | None = None
+        for x, y in np.unique(np.round(self.path[seen] / 0.1).astype(int), axis=0) * 0.1:
+            distance = np.hypot(self.path[:, :, 0] - x, self.path[:, :, 1] - y)
+            for radius in PLACE_RADII_M:
+                inside = seen & (distance < radius)
+                gain = energy[inside].sum() / whole - 1.5 * inside.sum() / seen.sum()
+                if best is None or gain > best[0]:
+                    best = (float(gain), (round(float(x), 2), round(float(y), 2), radius))
+        if best is None or best[0] < 0.3:
+            return None
+        x, y, radius = best[1]
+        mask = seen & (np.hypot(self.path[:, :, 0] - x, self.path[:, :, 1] - y) < radius)
+        return self._judge(channel, ON_THE_FLOOR, mask, rng, best[1])
+
+
+def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generator) -> Array:
+    """Return the energy inside a mask that is shifted in time, in each recording by another random length.
+
+    Blocks stay together, so that what lingers is no surprise; all shifts of a recording at once are a correlation.
+    """
+    bins = energy.shape[1]
+    spectrum = np.fft.rfft(energy, axis=1) * np.conj(np.fft.rfft(mask.astype(float), axis=1))
+    inside = np.fft.irfft(spectrum, bins, axis=1)
+    shifts = rng.integers(0, bins, (SHIFTS, len(energy)))
+    drawn: Array = inside[np.arange(len(energy)), shifts].sum(axis=1)
+    return drawn
+
+
+def _around(path: Array, spot: Spot) -> npt.NDArray[np.bool_]:
+    """Return when a robot was near a spot or had just left it, shape (recordings, bins)."""
+    near = np.hypot(path[:, :, 0] - spot.x_m, path[:, :, 1] - spot.y_m) < SPOT_M
+    felt = np.ones(1 + round(SPOT_S / BIN_S))
+    return np.stack([np.convolve(row, felt)[: len(row)] > 0 for row in near])
