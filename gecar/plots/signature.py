@@ -16,8 +16,8 @@ from gecar.reality.fitting.parameters import free
 from gecar.reality.recordings.recording import make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, LEFT_SPEED, RIGHT_ANGLE, X, Y
-from gecar.reality.replay.reflectance import look_along
-from gecar.reality.replay.replayer import Film
+from gecar.reality.replay.reflectance import readings_along
+from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course import Course
 from gecar.world.effects import BY_ID, Effect
 from gecar.world.robot import Robot
@@ -113,12 +113,12 @@ def _driven(robot: Robot, course: Course) -> _Drive:
     frames = {"x_m": START[0], "y_m": START[1], "heading_deg": 90.0}
     columns = {"t_s": t, "left_duty_pct": duty[:, 0], "right_duty_pct": duty[:, 1]}
     columns |= {name: np.full(len(t), value) for name, value in frames.items()}
-    film = Film(make_recording("signature", columns, Setup(course="none", duty_cap=1.0)))
-    rows, _, poses, _ = film.play(robot.physics, START)
+    replayer = replayer_of(make_recording("signature", columns, Setup(course="none", duty_cap=1.0)))
+    rows, _, poses, _ = replayer.play(robot.physics, START)
     reflection = np.empty(len(t))
     path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
-    look_along(
-        film.t,
+    readings_along(
+        replayer.t,
         path,
         0.0,
         QUIET_PCT,
@@ -129,7 +129,7 @@ def _driven(robot: Robot, course: Course) -> _Drive:
         reflection,
     )
     rows[:, [X, Y, HEADING]] = poses  # what a camera sees: late, where poses are
-    return _Drive(film.t, rows, reflection)
+    return _Drive(replayer.t, rows, reflection)
 
 
 def _draw_traces(traces: list[Axes], without: _Drive, with_it: _Drive, sight: bool) -> None:

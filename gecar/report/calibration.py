@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gecar.reality.calibrate.calibration import Calibration, Fitted
+from gecar.reality.calibrate.calibration import Calibration, FittedConstant
 from gecar.reality.calibrate.identifiability import BLIND
-from gecar.reality.prove.holdout import Misfit
+from gecar.reality.verdict import Misfit
 
 
 def calibration_lines(result: Calibration) -> list[str]:
@@ -28,7 +28,7 @@ def calibration_lines(result: Calibration) -> list[str]:
     return lines
 
 
-def fitted_line(fitted: Fitted) -> str:
+def fitted_line(fitted: FittedConstant) -> str:
     """Say what a constant was and is, with its 95 % interval."""
     unit = fitted.constant.unit
     interval = f"{fitted.rounded(fitted.low)} to {fitted.rounded(fitted.high)}"

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
-from gecar.reality.replay.replayer import Film
+from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.verdict import Found, NextRecording
 from gecar.world.robot import Robot
 
@@ -84,13 +84,13 @@ def suggest(
             f"{name}: shows whether what is left depends on speed, way or time", LIBRARY[name]
         )
     if found:
-        name = _telling(robot, _moved(robot, found[0]), like, noise)
+        name = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
         return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
     words = "reversals: nothing is missing so far; this asks most of gears, friction and grip"
     return NextRecording(words, LIBRARY["reversals"])
 
 
-def _moved(robot: Robot, found: Found) -> Robot:
+def _at_interval_end(robot: Robot, found: Found) -> Robot:
     """Return a robot with an effect's first parameter at the end of its interval."""
     label, interval = next(iter(found.parameters.items()))
     values = {name: i.value for name, i in found.parameters.items()}
@@ -104,12 +104,12 @@ def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> str:
 def _difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
     """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations."""
     blank = _recording(commands, {}, like)
-    rows = Film(blank, noise.sd).play(robot.physics, np.array(START))[0]
+    rows = replayer_of(blank, noise.sd).play(robot.physics, np.array(START)).rows
     angles = {"left_angle_deg": np.degrees(rows[:, 0]), "right_angle_deg": np.degrees(rows[:, 1])}
     poses = {"x_m": rows[:, 4], "y_m": rows[:, 5], "heading_deg": np.degrees(rows[:, 6])}
     seen = {**angles, **(poses if like.setup.rig == "floor" else {})}
-    film = Film(_recording(commands, seen, like), noise.sd, noise.walk, memory_s=1.0)
-    _, row_errors, _, pose_errors = film.play(rival.physics)
+    replayer = replayer_of(_recording(commands, seen, like), noise.sd, noise.walk, memory_s=1.0)
+    _, row_errors, _, pose_errors = replayer.play(rival.physics)
     return float(np.nansum(row_errors[:, :2] ** 2) + np.nansum(pose_errors**2))
 
 

@@ -1,37 +1,35 @@
-"""What a verdict says besides: what was taken out, taken for granted, or could not be looked for."""
+"""Notes beside a verdict: nuisances that were fitted, assumptions, and what could not be looked for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from gecar.reality.prove.holdout import Split
-from gecar.reality.residuals.of_recording import Strip
-from gecar.reality.selection.selection import Selection
+from gecar.reality.recordings.split import Split
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.residuals.of_recording import RecordingResiduals
 
 
-def remarks(split: Split, strips: Sequence[Strip], motion: Selection, doubted: bool) -> tuple[str, ...]:
-    """Return remarks, a sentence or two each.
+def notes_on(split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool) -> tuple[str, ...]:
+    """Return notes, a sentence or two each.
 
     Parameters
     ----------
     split
         What was fitted on and set aside.
-    strips
-        Of what was fitted on.
-    motion
-        The selection of effects of motion.
+    fitted
+        The recordings fitted on, with their nuisances.
+    clocks_fitted
+        Whether each camera's clock offset was fitted.
     doubted
-        Whether what was seen speaks against the path, not the sensor.
+        Whether a misfit of readings points to the measured path, rather than to the sensor.
     """
     notes = []
     if split.by_time:
         notes.append(
-            "Only one recording: its last part was set aside, so the proof is by time, not by another run."
+            "Only one recording: its last part was set aside, so it is judged on later times, not on another run."
         )
-    if motion.clocked:
-        late = ", ".join(f"{1e3 * o:.0f}" for o in motion.comparison.offsets)
+    if clocks_fitted:
+        late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
         notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
     if doubted:
         notes.append(
@@ -41,7 +39,7 @@ def remarks(split: Split, strips: Sequence[Strip], motion: Selection, doubted: b
     measured = {name for r in split.fitted for name in r.measured}
     if not {"x_m", "heading_rad"} & measured:
         notes.append("No pose was recorded: what only a camera sees was not looked for.")
-    located = [_beginning(strip) for strip in strips if strip.began is not None]
+    located = [_start(run) for run in fitted.recordings if run.nuisances.start is not None]
     if located:
         notes.append(
             f"Where no camera looked, readings tell the start, up to places that look the same: {'; '.join(located)}."
@@ -49,8 +47,8 @@ def remarks(split: Split, strips: Sequence[Strip], motion: Selection, doubted: b
     return tuple(notes)
 
 
-def _beginning(strip: Strip) -> str:
-    assert strip.began is not None
-    x, y, heading = strip.began.start
+def _start(run: RecordingResiduals) -> str:
+    assert run.nuisances.start is not None
+    x, y, heading = run.nuisances.start.start
     degrees = np.degrees(heading) % 360.0
-    return f"{strip.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"
+    return f"{run.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"

@@ -16,25 +16,24 @@ intervals by the delete-a-group jackknife with Student's t, Efron and Tibshirani
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
 from gecar.reality.calibrate.constant_fit import fitted
-from gecar.reality.calibrate.constants import MARK, Constant, Slack, chosen, with_constants
+from gecar.reality.calibrate.constants import MARK, Constant, FreeConstants, chosen, with_constants
 from gecar.reality.calibrate.identifiability import BLIND, at_bounds, sensitivities, told_apart
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
-from gecar.reality.prove.holdout import Misfit, Split, judge, split
+from gecar.reality.prove.holdout import judge
 from gecar.reality.recordings.camera_frame import corrected
 from gecar.reality.recordings.recording import Case, Recording
-from gecar.reality.residuals.of_case import Comparison
-from gecar.reality.residuals.of_recording import Strip
-from gecar.world.course import Course, load_course
+from gecar.reality.recordings.split import Split, hold_out
+from gecar.reality.residuals.of_case import Residuals, motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.verdict import Misfit
 from gecar.world.robot import Robot, load_robot
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +52,7 @@ COURSE = (
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedConstant:
     """A constant as fitted, with its 95 % interval."""
 
     constant: Constant
@@ -69,7 +68,7 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Unknown:
+class UnknownConstant:
     """A constant these recordings do not tell, and why; it keeps its nominal value."""
 
     constant: Constant
@@ -99,8 +98,8 @@ class Calibration:
 
     case: str
     robot: Robot
-    fitted: tuple[Fitted, ...]
-    unknown: tuple[Unknown, ...]
+    fitted: tuple[FittedConstant, ...]
+    unknown: tuple[UnknownConstant, ...]
     fitted_on: tuple[str, ...]
     held: tuple[str, ...]
     by_time: bool
@@ -135,19 +134,16 @@ def calibrate(
     InputError
         If a name is unknown, or a robot or course file is wrong.
     """
-    constants, parts = chosen(names), split(case, holdout)
+    constants, parts = chosen(names), hold_out(case, holdout)
     known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
     noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
-    strips = _strips(parts.fitted, noise)
     tell(f"fitting on {', '.join(r.name for r in parts.fitted)}")
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        motion = Comparison(strips, False, pool)
-        moved = _settle(motion, known, tuple(c for c in constants if not c.sight))
+    with Threads() as threads:
+        motion = _motion_residuals(parts.fitted, noise, threads)
+        moved = _fit_constants(motion, known, tuple(c for c in constants if not c.sensor))
         better = _taken(known, moved)
-        motion.set_mark(_camera(moved, MARK))
-        sight = Comparison(strips, True, pool)
-        sight.set_path(better.physics)
-        seen = _settle(sight, better, tuple(c for c in constants if c.sight))
+        sensor = motion.with_mark(_camera(moved, MARK)).with_paths(better.physics).of_sensor()
+        seen = _fit_constants(sensor, better, tuple(c for c in constants if c.sensor))
     calibrated = with_constants(
         better, {f.constant.name: f.value for f in seen.fitted}, f"{known.name}-{case.name}"
     )
@@ -161,16 +157,16 @@ def calibrate(
 
 
 @dataclass(frozen=True)
-class _Settled:
-    fitted: tuple[Fitted, ...]
-    unknown: tuple[Unknown, ...]
+class _Constants:
+    fitted: tuple[FittedConstant, ...]
+    unknown: tuple[UnknownConstant, ...]
 
 
-def _taken(robot: Robot, settled: _Settled) -> Robot:
+def _taken(robot: Robot, settled: _Constants) -> Robot:
     return with_constants(robot, {f.constant.name: f.value for f in settled.fitted})
 
 
-def _camera(settled: _Settled, fields: Sequence[str]) -> Array:
+def _camera(settled: _Constants, fields: Sequence[str]) -> Array:
     """Return what was fitted of the camera, 0 where nothing was, shape (fields,)."""
     found = {f.constant.kernel: f.value for f in settled.fitted if f.constant.section == "camera"}
     return np.array([found.get(field, 0.0) for field in fields])
@@ -182,56 +178,55 @@ def _clear(parts: Split, mark: Array, course: Array) -> Split:
     return Split(fitted, held, parts.by_time)
 
 
-def _strips(recordings: Sequence[Recording], noise: Noise) -> list[Strip]:
-    return [
-        Strip(r, noise, np.inf if r.setup.rig == "bench" else MEMORY_S, _course_of(r)) for r in recordings
-    ]
+def _motion_residuals(recordings: Sequence[Recording], noise: Noise, threads: Threads) -> Residuals:
+    return motion_residuals(recordings, noise, MEMORY_S, threads, bench_memory_s=np.inf)
 
 
-def _course_of(recording: Recording) -> Course | None:
-    setup = recording.setup
-    return load_course(setup.course) if setup.rig == "floor" and setup.course != "none" else None
-
-
-def _settle(comparison: Comparison, robot: Robot, constants: tuple[Constant, ...]) -> _Settled:
-    """Fit the constants a comparison tells; which they are is asked again where the fit ended."""
-    everything = Slack(robot, constants)
+def _fit_constants(residuals: Residuals, robot: Robot, constants: tuple[Constant, ...]) -> _Constants:
+    """Fit the constants a residuals tells; which they are is asked again where the fit ended."""
+    everything = FreeConstants(robot, constants)
     z = np.zeros(len(constants))
     told, reasons = np.zeros(len(constants), bool), dict.fromkeys(range(len(constants)), BLIND)
-    if not constants or not comparison.strips or not len(everything.errors(comparison, z)):
-        return _Settled(
+    if not constants or not residuals.recordings or not len(everything.errors(residuals, z)):
+        return _Constants(
             (),
-            tuple(Unknown(c, float(v), BLIND) for c, v in zip(constants, everything.standing, strict=True)),
+            tuple(
+                UnknownConstant(c, float(v), BLIND)
+                for c, v in zip(constants, everything.standing, strict=True)
+            ),
         )
     pressed: dict[int, str] = {}
     for _ in range(ROUNDS):
-        found, reasons = told_apart(comparison, everything, z, pressed)
+        found, reasons = told_apart(residuals, everything, z, pressed)
         if (found == told).all():
             break
         told = found
-        z = fitted(comparison, everything, told, np.where(told, z, 0.0))
+        z = fitted(residuals, everything, told, np.where(told, z, 0.0))
         pressed |= at_bounds(everything, z, told)
-    spread = _spread(comparison, everything, z, told)
+    spread = _spread(residuals, everything, z, told)
     values = everything.values(z)
     ends = [
         np.clip(everything.values(z + side * spread), [c.low for c in constants], [c.high for c in constants])
         for side in (-1, 1)
     ]
-    return _Settled(
-        tuple(Fitted(c, float(everything.standing[k]), float(values[k]), float(ends[0][k]), float(ends[1][k]))
+    return _Constants(
+        tuple(FittedConstant(c, float(everything.standing[k]), float(values[k]), float(ends[0][k]), float(ends[1][k]))
               for k, c in enumerate(constants) if told[k]),
-        tuple(Unknown(c, float(everything.standing[k]), reasons[k]) for k, c in enumerate(constants) if not told[k]),
+        tuple(UnknownConstant(c, float(everything.standing[k]), reasons[k])
+              for k, c in enumerate(constants) if not told[k]),
     )  # fmt: skip
 
 
-def _spread(comparison: Comparison, slack: Slack, z: Array, told: npt.NDArray[np.bool_]) -> Array:
+def _spread(
+    residuals: Residuals, free_constants: FreeConstants, z: Array, told: npt.NDArray[np.bool_]
+) -> Array:
     """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of them.
 
     Where there are recordings enough, the wider of both: a constant that one or two of them tell is told by few groups.
     """
-    errors, slopes = sensitivities(comparison, slack, z)
+    errors, slopes = sensitivities(residuals, free_constants, z)
     slopes = slopes[:, told]
-    halves = [_half_width(errors, slopes, groups) for groups in _groupings(comparison)]
+    halves = [_half_width(errors, slopes, groups) for groups in _groupings(residuals)]
     out = np.zeros(len(z))
     out[told] = np.hypot(np.max(halves, axis=0), TRUST_STEPS)
     return out
@@ -250,11 +245,11 @@ def _half_width(errors: Array, slopes: Array, groups: npt.NDArray[np.int64]) -> 
     return np.asarray(student.ppf(0.975, count - 1) * np.sqrt(variance))
 
 
-def _groupings(comparison: Comparison) -> list[npt.NDArray[np.int64]]:
+def _groupings(residuals: Residuals) -> list[npt.NDArray[np.int64]]:
     """Return each residual's group: a span of its recording, and its recording where those are not few."""
-    cells = comparison.cells
-    recording = cells.recording.astype(np.int64)
-    span = (cells.t_s / SPAN_S).astype(np.int64)
+    index = residuals.index
+    recording = index.recording.astype(np.int64)
+    span = (index.t_s / SPAN_S).astype(np.int64)
     spans = recording * (span.max() + 1) + span
     return [spans, recording] if len(np.unique(recording)) >= FEWEST_GROUPS else [spans]
 
@@ -263,14 +258,14 @@ def _judged(
     parts: Split, noise: Noise, before: Robot, after: Robot
 ) -> tuple[dict[str, Misfit], dict[str, dict[str, Misfit]]]:
     """Return misfits over what is held out, and of each recording, by column."""
-    with ThreadPoolExecutor(1) as pool:
-        strips = {r.name: s for r, s in zip(parts.held, _strips(parts.held, noise), strict=True)}
-        if not parts.by_time:
-            strips |= {r.name: s for r, s in zip(parts.fitted, _strips(parts.fitted, noise), strict=True)}
-        Comparison(list(strips.values()), True, pool).set_path(after.physics)
-        everyone = parts.held if parts.by_time else (*parts.fitted, *parts.held)
-        each = {r.name: _moving(r, judge([r], [strips[r.name]], noise, before, after)) for r in everyone}
-        return judge(parts.held, [strips[r.name] for r in parts.held], noise, before, after), each
+    everyone = parts.held if parts.by_time else (*parts.fitted, *parts.held)
+    with Threads() as threads:
+        beside = _motion_residuals(everyone, noise, threads).with_paths(after.physics)
+        alone = {run.recording.name: replace(beside, recordings=(run,)) for run in beside.recordings}
+        each = {r.name: _moving(r, judge(alone[r.name], before, after)) for r in everyone}
+        names = {r.name for r in parts.held}
+        held = tuple(run for run in beside.recordings if run.recording.name in names)
+        return judge(replace(beside, recordings=held), before, after), each
 
 
 def _moving(recording: Recording, misfits: dict[str, Misfit]) -> dict[str, Misfit]:

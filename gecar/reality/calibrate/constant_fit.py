@@ -13,10 +13,10 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.calibrate.constants import Constant, Slack
+from gecar.reality.calibrate.constants import Constant, FreeConstants
 from gecar.reality.calibrate.identifiability import PROBE
-from gecar.reality.optimisation.least_squares import Fit, cost, fit
-from gecar.reality.residuals.of_case import Comparison
+from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares
+from gecar.reality.residuals.of_case import Residuals
 
 Array = npt.NDArray[np.float64]
 Chosen = npt.NDArray[np.bool_]
@@ -31,12 +31,12 @@ _AGAIN, _WORTH = (
 )  # fits more, and the share of its cost by which one must help to be followed by another
 
 
-def fitted(comparison: Comparison, slack: Slack, told: Chosen, last: Array) -> Array:
+def fitted(residuals: Residuals, constants: FreeConstants, told: Chosen, last: Array) -> Array:
     """Return the vector that fits best, 0 where a constant is not told, shape (k,).
 
     Parameters
     ----------
-    comparison, slack
+    residuals, constants
         What to fit, and with which constants.
     told
         Which of them are free, shape (k,).
@@ -45,40 +45,43 @@ def fitted(comparison: Comparison, slack: Slack, told: Chosen, last: Array) -> A
     """
     if not told.any():
         return np.zeros(len(told))
-    starts = [last] if last.any() else _starts(comparison, slack, told)
-    ends = [_from(comparison, slack, told, start) for start in starts]
+    starts = [last] if last.any() else _starts(residuals, constants, told)
+    ends = [_from(residuals, constants, told, start) for start in starts]
     return _whole(np.zeros(len(told)), told, min(ends, key=lambda end: end.cost).z)
 
 
-def _starts(comparison: Comparison, slack: Slack, told: Chosen) -> Iterator[Array]:
+def _starts(residuals: Residuals, constants: FreeConstants, told: Chosen) -> Iterator[Array]:
     begin = np.zeros(len(told))
-    if not comparison.sight:
+    if not residuals.sensor:
         yield begin
         return
-    levels = told & _named(slack.constants, _LEVELS)
+    levels = told & _named(constants.constants, _LEVELS)
     if levels.any():
-        begin = _whole(begin, levels, _from(comparison, slack, levels, begin).z)
+        begin = _whole(begin, levels, _from(residuals, constants, levels, begin).z)
     yield begin
     for names in _PLACES:
-        begin = _scanned(comparison, slack, told & _named(slack.constants, names), begin)
+        begin = _scanned(residuals, constants, told & _named(constants.constants, names), begin)
         yield begin
 
 
-def _from(comparison: Comparison, slack: Slack, free: Chosen, start: Array) -> Fit:
+def _from(residuals: Residuals, constants: FreeConstants, free: Chosen, start: Array) -> Minimum:
     """Fit from a start; sight again from its end with finer differences, until that helps no more.
 
     The sensor's place and the course's are told apart by corners only: a long, narrow valley, in which a fit with
     coarse differences stops short.
     """
-    low, high = slack.bounds
+    low, high = constants.bounds
 
-    def once(at: Array, probe: float) -> Fit:
+    def once(at: Array, probe: float) -> Minimum:
         probes = np.full(int(free.sum()), probe)
-        return fit(lambda part: slack.errors(comparison, _whole(start, free, part)), at, (low[free], high[free]),
-                   probes, rounds=_ROUNDS)  # fmt: skip
+
+        def residual(part: Array) -> Array:
+            return constants.errors(residuals, _whole(start, free, part))
+
+        return least_squares(residual, at, (low[free], high[free]), probes, rounds=_ROUNDS)
 
     end = once(start[free], PROBE)
-    for _ in range(_AGAIN if comparison.sight else 0):
+    for _ in range(_AGAIN if residuals.sensor else 0):
         finer = once(end.z, 0.25 * PROBE)
         if finer.cost > (1.0 - _WORTH) * end.cost:
             return min(end, finer, key=lambda found: found.cost)
@@ -86,14 +89,14 @@ def _from(comparison: Comparison, slack: Slack, free: Chosen, start: Array) -> F
     return end
 
 
-def _scanned(comparison: Comparison, slack: Slack, free: Chosen, begin: Array) -> Array:
+def _scanned(residuals: Residuals, constants: FreeConstants, free: Chosen, begin: Array) -> Array:
     """Return the best of a grid of places around a vector."""
     if not free.any():
         return begin
-    low, high = slack.bounds
+    low, high = constants.bounds
     shifts = product(_SCAN, repeat=int(free.sum()))
     grid = [np.clip(_whole(begin, free, begin[free] + shift), low, high) for shift in shifts]
-    return min(grid, key=lambda z: cost(slack.errors(comparison, z)))
+    return min(grid, key=lambda z: cost(constants.errors(residuals, z)))
 
 
 def _named(constants: Sequence[Constant], fields: Sequence[str]) -> Chosen:

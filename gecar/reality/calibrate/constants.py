@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import expected
-from gecar.reality.residuals.of_case import Comparison
+from gecar.reality.residuals.of_case import Residuals
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot, robot_from
 
@@ -37,7 +37,7 @@ class Constant:
         Bounds.
     step
         A change that matters: the coordinate fits count in.
-    sight
+    sensor
         Whether it is fitted to what the colour sensor reads, and to nothing else.
     usual
         Whether it is freed unless others are asked for.
@@ -51,7 +51,7 @@ class Constant:
     low: float
     high: float
     step: float
-    sight: bool = False
+    sensor: bool = False
     usual: bool = True
 
     @property
@@ -87,17 +87,17 @@ CONSTANTS = (
     Constant("body", "yaw_inertia", "yaw_inertia", "yaw inertia", "kg m^2", 5e-4, 0.05, 2e-4, usual=False),
     Constant("body", "com_ahead", "com_ahead", "centre of mass ahead of the axle", "m", -0.084, 0.0, 0.004,
              usual=False),
-    Constant("colour_sensor", "white", "white", "reading on white", "%", 0.0, 100.0, 1.0, sight=True),
-    Constant("colour_sensor", "black", "black", "reading on black", "%", 0.0, 100.0, 1.0, sight=True),
-    Constant("colour_sensor", "ahead", "sensor_ahead", "sensor ahead of the axle", "m", 0.0, 0.16, 1.5e-3, sight=True),
+    Constant("colour_sensor", "white", "white", "reading on white", "%", 0.0, 100.0, 1.0, sensor=True),
+    Constant("colour_sensor", "black", "black", "reading on black", "%", 0.0, 100.0, 1.0, sensor=True),
+    Constant("colour_sensor", "ahead", "sensor_ahead", "sensor ahead of the axle", "m", 0.0, 0.16, 1.5e-3, sensor=True),
     Constant("colour_sensor", "left", "sensor_left", "sensor left of the middle", "m", -0.08, 0.08, 1.5e-3,
-             sight=True),
+             sensor=True),
     Constant("colour_sensor", "spot_diameter", "spot_diameter", "diameter of the sensor's spot", "m", 0.001, 0.05, 2e-3,
-             sight=True),
-    Constant("camera", "course_x", "line_dx", "course along the camera's x", "m", -0.12, 0.12, 2e-3, sight=True),
-    Constant("camera", "course_y", "line_dy", "course along the camera's y", "m", -0.12, 0.12, 2e-3, sight=True),
+             sensor=True),
+    Constant("camera", "course_x", "line_dx", "course along the camera's x", "m", -0.12, 0.12, 2e-3, sensor=True),
+    Constant("camera", "course_y", "line_dy", "course along the camera's y", "m", -0.12, 0.12, 2e-3, sensor=True),
     Constant("camera", "course_turn", "line_angle", "course turned in the camera's frame", "rad", -0.1, 0.1, 2e-3,
-             sight=True),
+             sensor=True),
 )  # fmt: skip
 BY_NAME = {constant.name: constant for constant in CONSTANTS}
 
@@ -117,8 +117,8 @@ def chosen(names: Sequence[str] = ()) -> tuple[Constant, ...]:
 
 
 @dataclass(frozen=True)
-class Slack:
-    """Constants of a robot set free: maps vectors, in steps from the robot as it stands, to physics records."""
+class FreeConstants:
+    """Free constants of a robot: maps vectors, in steps from the robot as it stands, to physics records."""
 
     robot: Robot
     constants: tuple[Constant, ...]
@@ -152,12 +152,12 @@ class Slack:
                 record[constant.kernel] = value
         return record
 
-    def errors(self, comparison: Comparison, z: Array) -> Array:
-        """Return a comparison's residuals at a vector; those of motion, with the poses as its mark has them."""
-        if not comparison.sight:
+    def errors(self, residuals: Residuals, z: Array) -> Array:
+        """Return a residuals's residuals at a vector; those of motion, with the poses as its mark has them."""
+        if not residuals.sensor:
             found = dict(zip((c.kernel for c in self.constants), self.values(z), strict=True))
-            comparison.set_mark(np.array([found.get(field, 0.0) for field in MARK]))
-        return comparison.errors(self.physics(z))
+            residuals = residuals.with_mark([found.get(field, 0.0) for field in MARK])
+        return residuals.errors(self.physics(z))
 
 
 def with_constants(robot: Robot, values: Mapping[str, float], name: str | None = None) -> Robot:

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from gecar.language.program import Program
 from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.replay.reflectance import look_along
+from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import Replay, replay
 from gecar.world.course import Course
 from gecar.world.robot import Robot
@@ -206,13 +207,10 @@ def _reckoned(recording: Recording, robot: Robot, course: Course | None) -> Path
     """Add up the wheels' angles from START, or from 0: arcs of the mean heading, exact for straight and circle."""
     body, r = robot.body, recording
     seen = ~(np.isnan(r.left_angle_rad) | np.isnan(r.right_angle_rad))
-    left, right = (body.wheel_radius * np.diff(a[seen]) for a in (r.left_angle_rad, r.right_angle_rad))
     start = (course.start.x_m, course.start.y_m, course.start.heading_rad) if course else (0.0, 0.0, 0.0)
-    heading = start[2] + np.r_[0.0, np.cumsum((right - left) / body.track_width)]
-    middle, way = 0.5 * (heading[1:] + heading[:-1]), 0.5 * (left + right)
-    x = start[0] + np.r_[0.0, np.cumsum(way * np.cos(middle))]
-    y = start[1] + np.r_[0.0, np.cumsum(way * np.sin(middle))]
-    return Path(r.t_s[seen] - r.t_s[0], x, y, heading)
+    left, right = r.left_angle_rad[seen], r.right_angle_rad[seen]
+    path = wheel_odometry(left, right, body.wheel_radius, body.track_width, start)
+    return Path(r.t_s[seen] - r.t_s[0], *path.T)
 
 
 def arrival_of(path: Path, course: Course | None) -> tuple[float, bool, int]:
@@ -269,7 +267,7 @@ def _readings(replayed: Replay, robot: Robot, course: Course) -> Array:
     """Return what the colour sensor would read along a replay [%]."""
     path = np.column_stack([replayed.x_m, replayed.y_m, replayed.heading_rad])
     readings, still = np.empty(len(path)), np.zeros(3)
-    look_along(
+    readings_along(
         replayed.t_s, path, 0.0, _QUIET_PCT, course.raster(), course.pitch_m, robot.physics, still, readings
     )
     return readings

@@ -1,8 +1,8 @@
-"""Where identification starts looking for an effect: values of its parameters worth a try.
+"""Values of an effect's parameters from which fits of it start.
 
-Most effects are found from a few sizes on both sides of neutral. Some have a landscape with many valleys, and are
-scanned: a slippery patch by place, a ripple by its cycles, a dead band by its edge. A replay of all recordings takes
-milliseconds, so where a scan needs to see what it does, it replays.
+Most effects are found from a few sizes on both sides of neutral, or from values their entry in the catalogue lists.
+Where the cost has many local minima, starting values are scanned: a slippery patch by place, a ripple by its cycles,
+a dead band by its edge. A replay of all recordings takes milliseconds, so that a scan may replay.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by sl
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 
 
-def starts(
+def initial_values(
     effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
 ) -> list[Values]:
     """Return values of an effect's parameters to start from, by label.
@@ -46,11 +46,11 @@ def starts(
     errors
         Returns the residuals under the effect with given values.
     """
-    if effect_id in _TRIED:
-        return list(_TRIED[effect_id](robot, recordings, errors))
-    special = _SPECIAL.get(effect_id)
-    if special is not None:
-        return list(special(robot, recordings))
+    effect = BY_ID[effect_id]
+    if effect.starts:
+        return list(effect.starts)
+    if effect.scan:
+        return list(_SCANS[effect.scan](robot, recordings, errors))
     return list(_both_sides(effect_id, robot))
 
 
@@ -69,7 +69,7 @@ def _sizes(c: Coordinate) -> Iterator[float]:
                 yield c.value(side)
 
 
-def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
+def _slow_speeds(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
     """Begin within the speeds recorded: above them breakaway friction is dry friction, and slopes lead nowhere.
 
     Where no shaft was recorded turning, any speed will do.
@@ -83,11 +83,11 @@ def _static(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
 def _top_speed(recording: Recording) -> float:
     """Return the fastest a shaft turned over `SPEED_OVER_S` [rad/s]."""
     every = max(int(np.searchsorted(recording.t_s, recording.t_s[0] + SPEED_OVER_S)), 1)
-    angles, t = _known(recording)[::every], recording.t_s[::every]
+    angles, t = _wheel_angles(recording)[::every], recording.t_s[::every]
     return float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None], initial=0.0))
 
 
-def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
     for duty in (2.0, 5.0, 10.0, 15.0, 20.0):
         yield {"duty_pct": duty, "offset_share": 1.0}
     levels = np.unique(np.abs(np.concatenate([r.commands.ravel() for r in recordings]))) * 100.0
@@ -97,7 +97,7 @@ def _dead_band(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values
         yield {"duty_pct": float(edge), "offset_share": 0.0}
 
 
-def _ripple(
+def _shaft_cycles(
     robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
 ) -> Iterator[Values]:
     """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
@@ -138,22 +138,18 @@ def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[s
 
 def _turned(recording: Recording, robot: Robot) -> float:
     """Return how far a shaft has turned at least [revolutions], by its angles or else by the path."""
-    angles = np.ptp(_known(recording), axis=0).max()
+    angles = np.ptp(_wheel_angles(recording), axis=0).max()
     path = np.column_stack([recording.x_m, recording.y_m])
     driven = np.hypot(*np.diff(path[~np.isnan(path).any(axis=1)], axis=0).T).sum()
     return float(angles or driven / robot.physics["wheel_radius"][0]) / math.tau
 
 
-def _known(recording: Recording) -> Array:
+def _wheel_angles(recording: Recording) -> Array:
     """Return the wheel angles [rad] without gaps, shape (rows, 2); 0 where there are none."""
     return np.nan_to_num(np.column_stack([recording.left_angle_rad, recording.right_angle_rad]))
 
 
-def _patch(
-    robot: Robot,  # noqa: ARG001
-    recordings: Sequence[Recording],
-    errors: Callable[[Values], Array],
-) -> Iterator[Values]:
+def _floor_cells(recordings: Sequence[Recording], errors: Callable[[Values], Array]) -> Iterator[Values]:
     """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
     places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
     if not len(places):
@@ -175,50 +171,25 @@ def _patch(
             }
 
 
-def _speed_limit(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+def _top_speeds(robot: Robot) -> Iterator[Values]:
     top = robot.battery.voltage / max(robot.motor.back_emf_constant, 1e-3) * robot.drive.duty_cap
     for share in (0.92, 0.8, 0.65, 0.5):
         yield {"speed_rad_s": max(share * top, BY_ID["speed_limit"].parameters[0].low)}
 
 
-def _slew(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
-    for rate in (1500.0, 600.0, 250.0, 100.0):
-        yield {"rate_pct_s": rate}
-
-
-def _line(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
-    for dx in (-0.024, -0.012, 0.0, 0.012, 0.024):
-        for dy in (-0.024, -0.012, 0.0, 0.012, 0.024):
-            for angle in (-0.012, 0.0, 0.012):
-                yield {"dx_m": dx, "dy_m": dy, "angle_rad": angle}
-
-
-def _mount(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:  # noqa: ARG001
+def _mounts(robot: Robot) -> Iterator[Values]:
     sensor = robot.colour_sensor
     for ahead in (-0.02, -0.01, 0.0, 0.01, 0.02):
         for left in (-0.02, -0.01, 0.0, 0.01, 0.02):
             yield {"ahead_m": max(sensor.ahead + ahead, 0.0), "left_m": sensor.left + left}
 
 
-def _positive(*labels_sizes: tuple[str, tuple[float, ...]]) -> list[Values]:
-    return [{label: size} for label, sizes in labels_sizes for size in sizes]
-
-
-_SPECIAL: dict[str, Callable[[Robot, Sequence[Recording]], Iterable[Values]]] = {
-    "static_friction": _static,
-    "dead_band": _dead_band,
-    "speed_limit": _speed_limit,
-    "command_slew": _slew,
-    "line_shift": _line,
-    "sensor_position": _mount,
-    "backlash": lambda robot, recordings: _positive(("angle_deg", (2.0, 5.0, 10.0))),  # noqa: ARG005
-    "start_latency": lambda robot, recordings: _positive(("time_s", (0.02, 0.05))),  # noqa: ARG005
-    "actuation_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.03, 0.08))),  # noqa: ARG005
-    "tyre_friction": lambda robot, recordings: _positive(("coefficient", (0.6, 0.35, 0.15, 1.2))),  # noqa: ARG005
-    "sensor_delay": lambda robot, recordings: _positive(("time_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
-    "sensor_lag": lambda robot, recordings: _positive(("time_constant_s", (0.01, 0.04, 0.1))),  # noqa: ARG005
-}
-_TRIED: dict[str, Callable[[Robot, Sequence[Recording], Callable[[Values], Array]], Iterable[Values]]] = {
-    "torque_ripple": _ripple,
-    "slippery_patch": _patch,
+Scan = Callable[[Robot, Sequence[Recording], Callable[[Values], Array]], Iterable[Values]]
+_SCANS: dict[str, Scan] = {
+    "slow speeds": lambda robot, recordings, errors: _slow_speeds(robot, recordings),  # noqa: ARG005
+    "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
+    "shaft cycles": _shaft_cycles,
+    "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
+    "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot),  # noqa: ARG005
+    "around the mount": lambda robot, recordings, errors: _mounts(robot),  # noqa: ARG005
 }

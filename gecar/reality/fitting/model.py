@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.parameters import Freedom
-from gecar.reality.optimisation.least_squares import Fit
+from gecar.reality.fitting.parameters import Parameters
+from gecar.reality.optimisation.least_squares import Minimum
 
 Array = npt.NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
 
-AT_BOUND, FAR = (
-    0.01,
-    8.0,
-)  # coordinates: where a bound is far from neutral, a fit that ends there has not ended
-HELD_DUTY = 5.0  # %: what friction holds anyway, 4 % of an EV3's duty, needs no dead band
+NOTHING_TOLERATED = np.zeros(1)
 
 
 @dataclass(frozen=True)
@@ -30,29 +26,46 @@ class Model:
     ----------
     effects
         Identifiers, in the order they were taken.
-    freedom, fit
-        Their parameters.
-    structure
-        Energy of the residuals that averages over short blocks leave, above noise.
-    shift
-        What changes too small for a name explain, taken off the residuals; shape (n,) or (1,).
+    parameters
+        Their free parameters.
+    minimum
+        Where the fit ended.
+    excess_energy
+        Energy of the residuals' block means above noise.
+    tolerated
+        What changes too small for a name explain, subtracted from the residuals; shape (n,) or (1,).
     """
 
     effects: tuple[str, ...]
-    freedom: Freedom
-    fit: Fit
-    structure: float
-    shift: Array = field(default_factory=lambda: np.zeros(1))
+    parameters: Parameters
+    minimum: Minimum
+    excess_energy: float
+    tolerated: Array = field(default_factory=lambda: NOTHING_TOLERATED)
 
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """Parameters' values as in a robot file."""
-        return self.freedom.values(self.fit.z)
+        return self.parameters.values(self.minimum.z)
+
+    @property
+    def physics(self) -> npt.NDArray[Any]:
+        """Physics record, shape (1,)."""
+        return self.parameters.physics(self.minimum.z)
+
+    @property
+    def z(self) -> Array:
+        """Coordinates, shape (k,)."""
+        return self.minimum.z
+
+    @property
+    def errors(self) -> Array:
+        """Whitened residuals, less what is tolerated, shape (n,)."""
+        return self.minimum.errors
 
     @property
     def cost(self) -> float:
-        """Robust cost of the whitened residuals."""
-        return self.fit.cost
+        """Robust cost of the residuals."""
+        return self.minimum.cost
 
 
 @dataclass(frozen=True)
@@ -70,11 +83,11 @@ class Step:
     left_out
         What it lowers the cost of left-out recordings by, one number a recording.
     null_95, p
-        The null's 95 % quantile, and the share of nulls that gain as much.
+        The null distribution's 95 % quantile, and the share of null draws that gain as much.
     worthwhile
         Whether its size is worth a name.
-    before, after
-        Structure without and with it, by the same measure.
+    energy_before, energy_after
+        Excess energy without and with it, by the same measure.
     """
 
     effect: str
@@ -85,32 +98,10 @@ class Step:
     null_95: float = np.nan
     p: float = np.nan
     worthwhile: bool = False
-    before: float = 0.0
-    after: float = 0.0
-
-
-class Fitted(Protocol):
-    """What has fitted effects: a model, or a first try of one."""
+    energy_before: float = 0.0
+    energy_after: float = 0.0
 
     @property
-    def freedom(self) -> Freedom:
-        """The effects' coordinates."""
-
-    @property
-    def fit(self) -> Fit:
-        """Where the fit ended."""
-
-
-def worthwhile(model: Fitted, effect: str) -> bool:
-    """Whether an effect's size in a model is worth a name."""
-    if effect == "dead_band":
-        found = model.freedom.values(model.fit.z)[effect]
-        return found["duty_pct"] >= 1.0 and (found["offset_share"] > 0.3 or found["duty_pct"] >= HELD_DUTY)
-    sizes = []
-    low, high = model.freedom.bounds
-    for k, (c, z) in enumerate(zip(model.freedom.coordinates, model.fit.z, strict=True)):
-        if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse):
-            # A cause has a size; what grows until it is stopped imitates another.
-            stopped = z != 0.0 and (z > high[k] - AT_BOUND or z < low[k] + AT_BOUND) and abs(z) > FAR
-            sizes.append(not stopped and abs(z) >= (0.02 if c.inverse else 1.0))
-    return any(sizes)
+    def drop(self) -> float:
+        """By how much it lowers the excess energy."""
+        return self.energy_before - self.energy_after

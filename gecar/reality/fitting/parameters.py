@@ -1,6 +1,6 @@
-"""Freed parameters: vectors near 0 that stand for changes of a robot's physics, one coordinate a parameter.
+"""Free parameters: vectors near 0 that stand for changes of a robot's physics, one coordinate a parameter.
 
-A coordinate counts in steps worth a name, from neutral. A parameter that vanishes at infinity (a ramp's rate, a limit)
+A coordinate counts in sizes worth a name, from neutral. A parameter that vanishes at infinity (a ramp's rate, a limit)
 runs as its inverse; a rate that only shapes an effect runs as its logarithm.
 """
 
@@ -19,17 +19,6 @@ from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
-# Parameters that only shape an effect and act by their ratio.
-_BY_RATIO = frozenset({"stribeck_speed", "patch_friction"})
-# What one coordinate is where a parameter only shapes an effect, in its unit: about what changes the shape visibly.
-_SHAPES = {
-    "dead_band_offset": 0.1,
-    "ripple_cycles": 0.01,  # over 100 rad of shaft, 1 rad of phase
-    "ripple_phase": 0.3,
-    "ripple_lead": 0.3,
-    "patch_x": 0.03,
-    "patch_y": 0.03,
-}
 _FAR_LOW = 1e-9
 EV3_STALL_TORQUE, EV3_INERTIA = 0.433, 0.00248  # N m, kg m^2: the catalogue's bounds are meant for these
 ALIKE = 4.0  # a drive at most so many times stronger or weaker keeps the EV3's bounds
@@ -37,14 +26,14 @@ ALIKE = 4.0  # a drive at most so many times stronger or weaker keeps the EV3's 
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One freed parameter.
+    """One free parameter.
 
     Attributes
     ----------
     effect, parameter
         Which.
     neutral
-        Its value in the robot as it stands, in the parameter's unit.
+        Its value in the robot as it is known, in the parameter's unit.
     scale
         How many times larger than an EV3's the robot's torques of this kind are; it stretches bounds and steps.
     """
@@ -62,13 +51,13 @@ class Coordinate:
     @property
     def ratio(self) -> bool:
         """Whether it acts by its ratio."""
-        return self.parameter.field in _BY_RATIO
+        return self.parameter.by_ratio
 
     @property
     def step(self) -> float:
         """What one coordinate is, in the parameter's unit (finite neutrals)."""
         p = self.parameter
-        return p.worthwhile * self.scale if p.worthwhile > 0.0 else _SHAPES[p.field]
+        return p.worthwhile * self.scale if p.worthwhile > 0.0 else p.shape_step
 
     def value(self, z: float) -> float:
         """Return the parameter's value at a coordinate."""
@@ -96,15 +85,15 @@ class Coordinate:
 
     @property
     def probe(self) -> float:
-        """How far to move it to feel its influence."""
+        """Step of finite differences."""
         if self.inverse:
             return 0.05
         return 0.1 if self.ratio else 0.4
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """A set of freed effects of a robot: maps vectors to physics records.
+class Parameters:
+    """The free parameters of some effects of a robot: maps vectors to physics records.
 
     Attributes
     ----------
@@ -119,7 +108,7 @@ class Freedom:
 
     @property
     def size(self) -> int:
-        """Number of freed parameters."""
+        """Number of free parameters."""
         return len(self.coordinates)
 
     @property
@@ -156,12 +145,12 @@ class Freedom:
         return z
 
 
-def free(robot: Robot, effect_ids: Sequence[str]) -> Freedom:
+def free(robot: Robot, effect_ids: Sequence[str]) -> Parameters:
     """Free every parameter of some effects."""
-    return Freedom(
+    return Parameters(
         robot,
         tuple(
-            Coordinate(BY_ID[i], p, _standing(robot, BY_ID[i], p), torque_scale(robot, p.unit))
+            Coordinate(BY_ID[i], p, _known_value(robot, BY_ID[i], p), torque_scale(robot, p.unit))
             for i in effect_ids
             for p in BY_ID[i].parameters
         ),
@@ -180,6 +169,6 @@ def torque_scale(robot: Robot, unit: str = "N m") -> float:
     return ratio if not 1.0 / ALIKE < ratio < ALIKE else 1.0
 
 
-def _standing(robot: Robot, effect: Effect, parameter: Parameter) -> float:
-    """Return a parameter's value in a robot as it stands, in the parameter's unit."""
+def _known_value(robot: Robot, effect: Effect, parameter: Parameter) -> float:
+    """Return a parameter's value of a robot as it is known, in the parameter's unit."""
     return float(robot.effects.get(effect.id, {}).get(parameter.label, robot.nominal(parameter)))

@@ -31,7 +31,7 @@ from gecar.reality.replay.kernel import (
     X,
     Y,
 )
-from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.residuals.of_recording import RecordingResiduals
 
 Array = npt.NDArray[np.float64]
 
@@ -100,7 +100,7 @@ TARGETS = (
 )  # fmt: skip
 
 
-def describe(fitted: Sequence[Strip], physics: npt.NDArray[Any]) -> tuple[Formula, ...]:
+def describe(fitted: Sequence[RecordingResiduals], physics: npt.NDArray[Any]) -> tuple[Formula, ...]:
     """Return formulas that describe what a model leaves, the most telling first.
 
     Chosen by leaving out fitted recordings alone: those set aside are for the judge.
@@ -113,7 +113,7 @@ def describe(fitted: Sequence[Strip], physics: npt.NDArray[Any]) -> tuple[Formul
         Record of the model, shape (1,).
     """
     found = []
-    tables = [_signals(strip, physics) for strip in fitted]
+    tables = [_signals(run, physics) for run in fitted]
     for number, (target, unit) in enumerate(TARGETS):
         signals = _enough([table[number] for table in tables if len(table[number].residual)])
         formula = _sparse(target, unit, signals) if signals else None
@@ -184,22 +184,22 @@ def _fitted(signals: list[_Signal], chosen: list[int]) -> Array:
     return np.linalg.solve(normal + 1e-9 * np.eye(len(chosen)) * (np.trace(normal) + 1e-12), pull)
 
 
-def _signals(strip: Strip, physics: npt.NDArray[Any]) -> list[_Signal]:
+def _signals(run: RecordingResiduals, physics: npt.NDArray[Any]) -> list[_Signal]:
     """Return a recording's residuals by target, with the terms filtered alike."""
-    film = strip.film
-    rows, row_errors, poses, _ = film.play(physics)
-    terms = state_terms(rows, film.t, strip.recording.commands)
-    sd, walk, memory = film.reel.sd, film.reel.walk, film.reel.memory
-    out = [_signal(film.t, terms, film.t, row_errors[:, k] * sd[0], sd[0], memory) for k in (0, 1)]
-    pose_t, raw = film.reel.pose_t, film.reel.pose - poses
+    replayer = run.replayer
+    rows, row_errors, poses, _ = replayer.play(physics)
+    terms = state_terms(rows, replayer.t, run.recording.commands)
+    sd, walk, memory = replayer.inputs.sd, replayer.inputs.walk, replayer.inputs.memory
+    out = [_signal(replayer.t, terms, replayer.t, row_errors[:, k] * sd[0], sd[0], memory) for k in (0, 1)]
+    pose_t, raw = replayer.inputs.pose_t, replayer.inputs.pose - poses
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     gap = float(np.median(np.diff(pose_t))) if len(pose_t) > 2 else 1.0
     place, turn = (float(sd[k] * np.sqrt(gap) / max(walk[k - 3], 1e-9)) for k in (3, 4))
     ahead = raw[:, 0] * cos + raw[:, 1] * sin if len(pose_t) else np.zeros(0)
     aside = raw[:, 1] * cos - raw[:, 0] * sin if len(pose_t) else np.zeros(0)
-    out.append(_signal(film.t, terms, pose_t, ahead, sd[3], place))
-    out.append(_signal(film.t, terms, pose_t, aside, sd[3], place))
-    out.append(_signal(film.t, terms, pose_t, raw[:, 2] if len(pose_t) else np.zeros(0), sd[4], turn))
+    out.append(_signal(replayer.t, terms, pose_t, ahead, sd[3], place))
+    out.append(_signal(replayer.t, terms, pose_t, aside, sd[3], place))
+    out.append(_signal(replayer.t, terms, pose_t, raw[:, 2] if len(pose_t) else np.zeros(0), sd[4], turn))
     return out
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from gecar.reality.locate.hotspot import Spot
-from gecar.reality.locate.misfit_energy import loudness, typical
+from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
 from gecar.reality.locate.regimes import regime_masks
-from gecar.reality.residuals.of_recording import CHANNELS, Cells, Strip
+from gecar.reality.replay.channels import CHANNELS, REFLECTION, ResidualIndex
+from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.verdict import Place
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +23,6 @@ ON_THE_FLOOR = "place on the floor"
 BIN_S = 0.1
 SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happened there is felt
 SHIFTS = 499
-SURE = 0.05
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
@@ -30,20 +30,25 @@ FAINT = 0.02  # of the loudest channel's energy, of motion or of sight: less is 
 PLACE_RADII_M = (0.1, 0.2, 0.3)
 SPAN_BINS = 2  # bins a span is made of
 LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
-SIGHT = 7
-GROUPS = ([0, 1], [2], [3], [4, 5, 6], [SIGHT])  # channels that one sensor measures: they are loud together
-POSE_GROUP, SIGHT_GROUP = 3, 4
+GROUPS = (
+    [0, 1],
+    [2],
+    [3],
+    [4, 5, 6],
+    [REFLECTION],
+)  # channels that one sensor measures: they are loud together
+POSE_GROUP, READING_GROUP = 3, 4
 _GROUP = np.repeat(range(len(GROUPS)), [len(group) for group in GROUPS])
 
 
-class Map:
+class MismatchMap:
     """Whitened energy of a case by channel, recording and time.
 
     Parameters
     ----------
-    strips
+    runs
         The recordings.
-    errors, cells
+    errors, index
         Residuals of motion of the robot as it was known, and where they come from.
     before, after
         Physics records of the robot as it was known, and with what was found; of sight, both know what was found to
@@ -61,7 +66,7 @@ class Map:
     ----------
     energy
         Summed squares of a bin's innovations, less noise, shape (channels, recordings, bins); 0 where nothing was
-        measured: it is high where an error begins. What was seen has no innovations: there it is what `loud` is.
+        measured: it is high where an error begins. Readings have no innovations: there it is energy over stretches.
     loud
         What a mismatch adds up to over a stretch (see `gecar.reality.locate.misfit_energy`), in variances of noise,
         shape (groups of channels, recordings, spans).
@@ -71,31 +76,31 @@ class Map:
 
     def __init__(
         self,
-        strips: Sequence[Strip],
+        runs: Sequence[RecordingResiduals],
         errors: Array,
-        cells: Cells,
+        index: ResidualIndex,
         before: Physics,
         moved: Physics,
         after: Physics,
         explained: tuple[bool, bool] = (True, True),
         doubted: bool = False,
-        spot: Spot | None = None,
+        spot: tuple[float, float] | None = None,
     ) -> None:
-        self.strips = tuple(strips)
-        self.bins = SPAN_BINS * max(int(s.film.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in strips)
-        shape = (len(CHANNELS), len(strips), self.bins)
+        self.runs = tuple(runs)
+        self.bins = SPAN_BINS * max(int(s.replayer.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in runs)
+        shape = (len(CHANNELS), len(runs), self.bins)
         total, count = np.zeros(shape), np.zeros(shape)
-        at = (cells.channel, cells.recording, np.minimum((cells.t_s / BIN_S).astype(int), self.bins - 1))
+        at = (index.channel, index.recording, np.minimum((index.t_s / BIN_S).astype(int), self.bins - 1))
         np.add.at(total, at, np.clip(errors, -CLIP, CLIP) ** 2 - 1.0)
         np.add.at(count, at, 1.0)
         loud, seen = self._loud(before, moved, after, explained)
-        total[SIGHT], count[SIGHT] = loud[SIGHT], seen[SIGHT]
-        self.masks, self.path = regime_masks(self.strips, before, self.bins, BIN_S)
+        total[REFLECTION], count[REFLECTION] = loud[REFLECTION], seen[REFLECTION]
+        self.masks, self.path = regime_masks(self.runs, before, self.bins, BIN_S)
         counts = np.ones(self.path.shape[:2], bool) if spot is None else _around(self.path, spot)
         loud = loud * counts
         self.energy = np.where((count > 0) & counts, total, 0.0)
         self.samples = count
-        self._motion_explained, self._doubted, self.spot = explained[0], doubted, spot
+        self._motion_explained, self.doubted, self.spot = explained[0], doubted, spot
         spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
         self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
 
@@ -103,12 +108,13 @@ class Map:
         self, before: Physics, moved: Physics, after: Physics, explained: tuple[bool, bool]
     ) -> tuple[Array, Array]:
         """Return what a mismatch adds up to over a stretch, and the samples, by channel, recording and bin."""
-        sums = [loudness(s, before, moved, after, self.bins, BIN_S) for s in self.strips]
+        sums = [misfit_energy(s, before, moved, after, self.bins, BIN_S) for s in self.runs]
         was, left, samples, added = (np.stack([one[k] for one in sums], axis=1) for k in range(4))
-        noise = typical(added, samples, explained[0])[:, None, None]
+        noise = noise_inflation(added, samples, explained[0])[:, None, None]
         # Sight that needs no explanation is the path's noise; motion that needs none may still be told apart.
         known = np.array(
-            [explained[0] and bool((was[:SIGHT] != left[:SIGHT]).any())] * SIGHT + [explained[1]]
+            [explained[0] and bool((was[:REFLECTION] != left[:REFLECTION]).any())] * REFLECTION
+            + [explained[1]]
         )
         taken = np.where(known[:, None, None], (was - left) / noise, was / noise - samples)
         return np.where(samples > 0, taken, 0.0), samples
@@ -119,7 +125,7 @@ class Map:
         mean = excess / np.maximum(self.samples.sum(axis=(1, 2)), 1.0)
         order = self._order()
         found = []
-        most = np.where(np.arange(len(CHANNELS)) < SIGHT, excess[:SIGHT].max(), excess[SIGHT])
+        most = np.where(np.arange(len(CHANNELS)) < REFLECTION, excess[:REFLECTION].max(), excess[REFLECTION])
         for channel in np.flatnonzero((mean > WORTH) & (excess > FAINT * most)):
             entries = [self._judge(int(channel), name, mask, rng) for name, mask in self.masks.items()]
             entries.append(self._spot(int(channel), rng))
@@ -127,7 +133,7 @@ class Map:
             found += [(group, excess[channel] * telling, place) for telling, place in filter(None, entries)]
         if order and not any(group == 0 for group, _, _ in found):
             last = self._throughout(max(GROUPS[order[0]], key=lambda k: excess[k]))
-            found += [(0, 0.0, last)] if last.p <= SURE else []
+            found += [(0, 0.0, last)] if last.p <= SIGNIFICANCE else []
         found.sort(key=lambda entry: (entry[0], -entry[1]))
         return tuple(place for _, _, place in found[:MOST])
 
@@ -137,9 +143,9 @@ class Map:
         Where motion itself is not explained, nor is the path to be trusted: what was seen along it comes last.
         """
         loud = self.loud.sum(axis=(1, 2))
-        if self._doubted or not self._motion_explained:
-            loud[SIGHT_GROUP] = loud.min() - 1.0
-        if self._doubted:
+        if self.doubted or not self._motion_explained:
+            loud[READING_GROUP] = loud.min() - 1.0
+        if self.doubted:
             loud[POSE_GROUP] = loud.max() + 1.0
         if (loud <= 0.0).all():
             loud = np.array([self.energy[group].sum() for group in GROUPS])
@@ -161,7 +167,7 @@ class Map:
         share = inside / whole
         drawn = _shifted(energy, mask, rng)
         p = float((1 + np.sum(drawn >= inside)) / (1 + SHIFTS))
-        if p > SURE or share <= covered:
+        if p > SIGNIFICANCE or share <= covered:
             return None
         loud, spans = self._spans(channel)
         place = Place(
@@ -170,7 +176,7 @@ class Map:
             round(float(min(share, 1.0)), 3),
             p,
             spans,
-            self.strips[loud].recording.name,
+            self.runs[loud].recording.name,
             spot,
         )
         return float((share - covered) * np.sqrt(share)), place
@@ -193,7 +199,7 @@ class Map:
         count = self.samples[channel].sum()
         p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + SHIFTS))
         loud, spans = self._spans(channel)
-        name = self.strips[loud].recording.name
+        name = self.runs[loud].recording.name
         if self.spot is None:
             return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
         return Place(CHANNELS[channel], ON_THE_FLOOR, 1.0, round(p, 3), spans, name, (*self.spot, SPOT_M))
@@ -233,8 +239,8 @@ def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generato
     return drawn
 
 
-def _around(path: Array, spot: Spot) -> npt.NDArray[np.bool_]:
+def _around(path: Array, spot: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Return when a robot was near a spot or had just left it, shape (recordings, bins)."""
-    near = np.hypot(path[:, :, 0] - spot.x_m, path[:, :, 1] - spot.y_m) < SPOT_M
+    near = np.hypot(path[:, :, 0] - spot[0], path[:, :, 1] - spot[1]) < SPOT_M
     felt = np.ones(1 + round(SPOT_S / BIN_S))
     return np.stack([np.convolve(row, felt)[: len(row)] > 0 for row in near])

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.replay.kernel import AHEAD, HEADING, LEFT_SPEED, RIGHT_SPEED, YAW_RATE, X, Y
-from gecar.reality.residuals.of_recording import Strip
+from gecar.reality.residuals.of_recording import RecordingResiduals
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -21,27 +21,30 @@ TURNING, STRAIGHT = 1.5, 0.25  # rad/s
 
 
 def regime_masks(
-    strips: Sequence[Strip], physics: npt.NDArray[Any], bins: int, bin_s: float
+    runs: Sequence[RecordingResiduals], physics: npt.NDArray[Any], bins: int, bin_s: float
 ) -> tuple[dict[str, Mask], Array]:
     """Return regimes by name, each of shape (recordings, bins), and the path, shape (recordings, bins, 2) [m]."""
-    tables = [_table(strip, physics, bins, bin_s) for strip in strips]
+    tables = [_table(run, physics, bins, bin_s) for run in runs]
     names = tables[0][0].keys()
     masks = {name: np.stack([table[0][name] for table in tables]) for name in names}
     return masks, np.stack([table[1] for table in tables])
 
 
-def _table(strip: Strip, physics: npt.NDArray[Any], bins: int, bin_s: float) -> tuple[dict[str, Mask], Array]:
-    rows, t = strip.film.play(physics)[0], strip.film.t
-    pose = strip.path if strip.began is not None else rows[:, [X, Y, HEADING]]
-    placed = strip.began is not None or len(strip.film.reel.pose_t) > 0
+def _table(
+    run: RecordingResiduals, physics: npt.NDArray[Any], bins: int, bin_s: float
+) -> tuple[dict[str, Mask], Array]:
+    rows, t = run.replayer.play(physics)[0], run.replayer.t
+    sensor_path, located = run.nuisances.path, run.nuisances.start is not None
+    pose = sensor_path.poses if located and sensor_path is not None else rows[:, [X, Y, HEADING]]
+    placed = located or run.replayer.has_poses
     centres = (np.arange(bins) + 0.5) * bin_s
     at = np.minimum(np.searchsorted(t, centres), len(t) - 1)
     there = centres <= t[-1]
-    masks = _motions(rows[at], strip.recording.commands[at], max(int(AFTER_S / bin_s), 1))
+    masks = _motions(rows[at], run.recording.commands[at], max(int(AFTER_S / bin_s), 1))
     masks["early"], masks["late"] = centres < t[-1] / 3.0, centres > 2.0 * t[-1] / 3.0
     for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
         masks[name] = (np.cos(pose[at, 2] - way * np.pi) > np.sqrt(0.5)) & ~masks["standing"] & placed
-    masks["on the line's edge"] = _edges(strip, physics, at) if strip.looks else np.zeros(bins, bool)
+    masks["on the line's edge"] = _edges(run, physics, at) if run.reads else np.zeros(bins, bool)
     path = np.where(there[:, None] & placed, pose[at, :2], np.nan)
     return {name: mask & there for name, mask in masks.items()}, path
 
@@ -85,7 +88,7 @@ def _turned(speed: Array) -> Mask:
     return np.r_[False, held[1:] * held[:-1] < 0.0]
 
 
-def _edges(strip: Strip, physics: npt.NDArray[Any], at: npt.NDArray[np.intp]) -> Mask:
-    readings = strip.readings(physics)
+def _edges(run: RecordingResiduals, physics: npt.NDArray[Any], at: npt.NDArray[np.intp]) -> Mask:
+    readings = run.readings(physics)
     slope = np.abs(np.gradient(readings))
     return np.convolve(slope, np.ones(9), "same")[at] > 10.0

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.replay.replayer import USUAL_NOISE, Film
+from gecar.reality.replay.replayer import USUAL_NOISE, Replayer, replayer_of
+from gecar.reality.replay.smoothed_path import SMOOTH_S
 
 Array = npt.NDArray[np.float64]
 MAD = 1.4826  # standard deviation of a normal distribution per median absolute deviation
@@ -31,28 +32,21 @@ class Noise:
     sd
         Encoder [rad], battery [V], yaw rate [rad/s], x and y [m], heading [rad], shape (5,).
     walk
-        What the pose may wander besides: [m/sqrt(s)], [rad/sqrt(s)], shape (2,).
+        Process noise of the pose, a random walk: [m/sqrt(s)], [rad/sqrt(s)], shape (2,).
     reflection_sd
         Of a reading on an even floor [%].
     path_sd
         Of the smoothed path [m, m, rad], shape (3,).
-    offsets
-        How late a recording's camera clock is, by recording [s].
     """
 
     sd: Array
     walk: Array
     reflection_sd: float
     path_sd: Array
-    offsets: Mapping[str, float] = field(default_factory=dict)
-
-    def offset(self, name: str) -> float:
-        """Return how late a recording's camera clock is [s]."""
-        return float(self.offsets.get(name, 0.0))
 
 
 def estimate_noise(recordings: Sequence[Recording], physics: npt.NDArray[Any], memory_s: float) -> Noise:
-    """Estimate noise from second differences of what a replay leaves, which no motion error can make large.
+    """Estimate noise from second differences of a replay's residuals, in which errors of the motion hardly show.
 
     Parameters
     ----------
@@ -63,16 +57,16 @@ def estimate_noise(recordings: Sequence[Recording], physics: npt.NDArray[Any], m
     memory_s
         The memory replays will have [s].
     """
-    films = [Film(r, memory_s=memory_s) for r in recordings]
+    replayers = [replayer_of(r, memory_s=memory_s) for r in recordings]
     left: list[list[Array]] = [[] for _ in range(5)]
     speeds, turns, paces = [], [], []
-    for film in films:
-        rows, row_errors, poses, _ = film.play(physics)
-        sd = film.reel.sd
+    for replayer in replayers:
+        rows, row_errors, poses, _ = replayer.play(physics)
+        sd = replayer.inputs.sd
         for k, into in ((0, 0), (1, 0), (2, 1), (3, 2)):
             left[into].append(_second_differences(row_errors[:, k] * sd[into]))
         for k, into in ((0, 3), (1, 3), (2, 4)):
-            left[into].append(_second_differences(film.reel.pose[:, k] - poses[:, k]))
+            left[into].append(_second_differences(replayer.inputs.pose[:, k] - poses[:, k]))
         speeds += [rows[:, 7], rows[:, 8]]
         paces.append(rows[:, 9])
         turns.append(rows[:, 3])
@@ -82,7 +76,7 @@ def estimate_noise(recordings: Sequence[Recording], physics: npt.NDArray[Any], m
     sd[0] = np.sqrt(max(sd[0], quantum / np.sqrt(12.0)) ** 2 + motion**2)
     walk = np.array([2.0 * TRUST * _rms(paces) + 1e-4, TRUST * _rms(turns) + 2e-4])
     sd = _stated(recordings, sd)
-    frames = max(_frames_per_smoothing(films), 1.0)
+    frames = max(_frames_per_smoothing(replayers), 1.0)
     path_sd = PATH_CAUTION * np.array([sd[3], sd[3], sd[4]]) / np.sqrt(frames)
     return Noise(sd, walk, _reflection_sd(recordings), path_sd)
 
@@ -133,10 +127,8 @@ def _reflection_sd(recordings: Sequence[Recording]) -> float:
     return max(1.25 * float(np.sqrt(np.mean(near**2))) if len(near) else 1.0, 0.5)
 
 
-def _frames_per_smoothing(films: Sequence[Film]) -> float:
-    from gecar.reality.replay.smoothed_path import SMOOTH_S  # noqa: PLC0415
-
-    gaps = [np.median(np.diff(f.reel.pose_t)) for f in films if len(f.reel.pose_t) > 2]
+def _frames_per_smoothing(replayers: Sequence[Replayer]) -> float:
+    gaps = [np.median(np.diff(r.inputs.pose_t)) for r in replayers if len(r.inputs.pose_t) > 2]
     return float(3.5 * SMOOTH_S / np.median(gaps)) if gaps else 1.0
 
 

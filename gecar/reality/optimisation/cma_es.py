@@ -1,4 +1,4 @@
-"""Search on rough ground: where slip, play or an edge of a patch makes the cost jump, slopes mislead.
+"""Derivative-free minimisation, for costs that jump: slip, play, the edge of a patch on the floor.
 
 Source: covariance matrix adaptation evolution strategy (CMA-ES), Hansen, arXiv:1604.00772, with its default weights
 and learning rates.
@@ -14,11 +14,11 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-PATIENCE = 6  # generations without a gain worth mentioning, after which a search ends
-MENTIONED = 0.1  # of cost: log likelihoods, so this is nothing
+PATIENCE = 6  # generations without such a gain after which the search ends
+LEAST_GAIN = 0.1  # of cost, a log likelihood: smaller gains do not restart the patience
 
 
-def rough_search(
+def cma_es(
     cost: Callable[[Array], float],
     start: Array,
     spread: Array,
@@ -34,20 +34,20 @@ def rough_search(
     cost
         What to minimise.
     start, spread
-        Where to look, and how far about it, shape (k,).
+        Initial mean and standard deviations, shape (k,).
     bounds
         Lowest and highest vectors; what falls outside is tried at the bound.
     rng
-        Source of chance.
+        Random generator.
     generations
         Of 7 + 3 ln(k) trials each.
     wider
-        Times so many trials, where there are many valleys.
+        Factor on the number of trials a generation, for costs with many local minima.
     """
     trials = wider * (7 + int(3 * math.log(len(start))) if len(start) > 1 else 6)
     strategy = _Strategy(len(start), trials)
     best, least = np.clip(start, *bounds), cost(np.clip(start, *bounds))
-    mentioned, since = least, 0
+    reference, since = least, 0
     for _ in range(generations):
         steps = strategy.ask(rng)
         places = np.clip(start + spread * (strategy.mean + strategy.sigma * steps), *bounds)
@@ -56,8 +56,8 @@ def rough_search(
         if found[order[0]] < least:
             best, least = places[order[0]], float(found[order[0]])
         since += 1
-        if least < mentioned - MENTIONED:
-            mentioned, since = least, 0
+        if least < reference - LEAST_GAIN:
+            reference, since = least, 0
         if since >= PATIENCE:
             break
         strategy.tell(steps[order])

@@ -1,6 +1,6 @@
-"""Bounded least squares on whitened residuals: a trust region by damping, steps of a size the physics can feel.
+"""Bounded robust least squares: Levenberg-Marquardt on whitened residuals, with derivatives by finite differences.
 
-Residuals far off count less (pseudo-Huber): a wheel that slips a moment too late must not own the fit.
+Large residuals count linearly (pseudo-Huber loss), so that a wheel that slips a moment too late does not dominate.
 
 Sources: Levenberg-Marquardt, Nocedal and Wright, Numerical Optimization (2nd ed.), ch. 10; pseudo-Huber by
 reweighting, Hartley and Zisserman, Multiple View Geometry (2nd ed.), appendix 6.8.
@@ -34,8 +34,8 @@ def weights(errors: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Where a fit ended.
+class Minimum:
+    """Where a minimisation ended.
 
     Attributes
     ----------
@@ -43,15 +43,12 @@ class Fit:
         Coordinates, shape (k,).
     errors
         Whitened residuals there, shape (n,).
-    jacobian
-        Their derivatives, shape (n, k), last taken near there.
     cost
         Robust cost.
     """
 
     z: Array
     errors: Array
-    jacobian: Array
     cost: float
 
 
@@ -68,14 +65,14 @@ def jacobian(
     return columns
 
 
-def fit(
+def least_squares(
     residual: Callable[[Array], Array],
     start: Array,
     bounds: tuple[Array, Array],
     probes: Array,
     rounds: int = 12,
     close: float = 1e-3,
-) -> Fit:
+) -> Minimum:
     """Minimise the robust cost of a residual function.
 
     Parameters
@@ -96,7 +93,6 @@ def fit(
     errors = residual(z)
     now = cost(errors)
     damping = 1e-3
-    slopes = np.empty((len(errors), len(z)))
     for _ in range(rounds):
         slopes = jacobian(residual, z, errors, probes, high)
         w = weights(errors)[:, None]
@@ -114,11 +110,11 @@ def fit(
             damping *= 6.0
         if before - now < max(close * 1e-2 * before, 0.02):
             break
-    return Fit(z, errors, slopes, now)
+    return Minimum(z, errors, now)
 
 
 def _step(z: Array, normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
-    """Return the next vector; coordinates that press against a bound stay there."""
+    """Return the next vector; coordinates at an active bound stay there."""
     free = ~(((z <= low) & (gradient > 0.0)) | ((z >= high) & (gradient < 0.0)))
     move = np.zeros_like(z)
     if free.any():

@@ -27,14 +27,11 @@ from gecar.world.state import derive, place
 Array = npt.NDArray[np.float64]
 
 # Columns of what a replay predicts at each row; angles, voltage and rate before the row's own measurement corrects it.
-LEFT_ANGLE, RIGHT_ANGLE, BATTERY, YAW_RATE, X, Y, HEADING, LEFT_SPEED, RIGHT_SPEED, AHEAD, ASIDE, PLAY = (
-    range(12)
-)
-ROW_COLUMNS = 12
-ROW_CHANNELS = 4  # of them, those a row measures itself
+LEFT_ANGLE, RIGHT_ANGLE, BATTERY, YAW_RATE, X, Y, HEADING, LEFT_SPEED, RIGHT_SPEED, AHEAD, ASIDE = range(11)
+ROW_COLUMNS = 11
 
 
-class Reel(NamedTuple):
+class KernelInput(NamedTuple):
     """A recording as the kernel reads it.
 
     Attributes
@@ -50,7 +47,7 @@ class Reel(NamedTuple):
     sd
         Noise: one encoder's [rad], battery [V], yaw rate [rad/s], x and y [m], heading [rad], shape (5,).
     walk
-        What the pose may wander besides what is simulated: position [m/sqrt(s)], heading [rad/sqrt(s)], shape (2,).
+        Process noise of the pose, a random walk: position [m/sqrt(s)], heading [rad/sqrt(s)], shape (2,).
     memory
         Over which wheel angles are re-based [s]; inf: never, and neither is the pose.
     bench
@@ -86,11 +83,11 @@ def _held(commands: Array, t: Array, motor: int, at: int, start: float, end: flo
 
 
 @compiled
-def _see_rows(
+def _compare_rows(
     i: int,
     now: float,
     stretch: float,
-    reel: Reel,
+    inputs: KernelInput,
     s: Any,
     p: Any,
     rows: Array,
@@ -98,9 +95,9 @@ def _see_rows(
     last: Array,
 ) -> int:
     """Predict, compare and re-base at every row up to now; return the next row."""
-    endless = math.isinf(reel.memory)
-    while i < reel.t.shape[0] and reel.t[i] * stretch <= now + 1e-9:
-        back = now - reel.t[i] * stretch
+    endless = math.isinf(inputs.memory)
+    while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
+        back = now - inputs.t[i] * stretch
         rows[i, 0] = s.left_angle - s.left_speed * back
         rows[i, 1] = s.right_angle - s.right_speed * back
         rows[i, 2] = supply(s, p)
@@ -112,16 +109,15 @@ def _see_rows(
         rows[i, 8] = s.right_speed
         rows[i, 9] = s.vx * s.cos + s.vy * s.sin
         rows[i, 10] = s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
-        rows[i, 11] = s.left_play - s.right_play
         for k in range(4):
-            errors[i, k] = (reel.measured[i, k] - rows[i, k]) / reel.sd[max(k - 1, 0)]
+            errors[i, k] = (inputs.measured[i, k] - rows[i, k]) / inputs.sd[max(k - 1, 0)]
         for k in range(2):
             if not (endless or math.isnan(errors[i, k])):
                 # A young mean weighs all it has seen alike; an old one forgets.
-                keep = math.exp(-(reel.t[i] - last[k]) / reel.memory)
+                keep = math.exp(-(inputs.t[i] - last[k]) / inputs.memory)
                 last[2 + k] = 1.0 + last[2 + k] * keep
-                last[k] = reel.t[i]
-                shift = errors[i, k] * reel.sd[0] / last[2 + k]
+                last[k] = inputs.t[i]
+                shift = errors[i, k] * inputs.sd[0] / last[2 + k]
                 if k == 0:
                     s.left_angle += shift
                 else:
@@ -131,7 +127,7 @@ def _see_rows(
 
 
 @compiled
-def _wander(before: Array, x: float, y: float, elapsed: float, walk: Array, spread: Array) -> None:
+def _grow_covariance(before: Array, x: float, y: float, elapsed: float, walk: Array, spread: Array) -> None:
     """Let the pose's uncertainty grow over a stretch driven since the last pose.
 
     d(x, y) follows the heading's error turned a quarter: F = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]];
@@ -151,14 +147,14 @@ def _wander(before: Array, x: float, y: float, elapsed: float, walk: Array, spre
 
 
 @compiled
-def _see_poses(
-    j: int, now: float, stretch: float, late: float, reel: Reel, s: Any, p: Any,
+def _compare_poses(
+    j: int, now: float, stretch: float, late: float, inputs: KernelInput, s: Any, p: Any,
     poses: Array, errors: Array, before: Array, spread: Array, shift: Array,
 ) -> int:  # fmt: skip
     """Predict, compare and re-base at every pose up to now; return the next pose."""
-    endless = math.isinf(reel.memory)
-    while j < reel.pose_t.shape[0] and (reel.pose_t[j] - late) * stretch <= now + 1e-9:
-        back = max(now - (reel.pose_t[j] - late) * stretch, 0.0) if now > 0.0 else 0.0
+    endless = math.isinf(inputs.memory)
+    while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
+        back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if now > 0.0 else 0.0
         axle_x = s.x - p.com_ahead * s.cos
         axle_y = s.y - p.com_ahead * s.sin
         poses[j, 0] = axle_x - (s.vx + s.yaw_rate * p.com_ahead * s.sin) * back
@@ -166,14 +162,16 @@ def _see_poses(
         poses[j, 2] = s.heading - s.yaw_rate * back
         if endless:
             for k in range(3):
-                errors[j, k] = (reel.pose[j, k] - poses[j, k]) / reel.sd[3 if k < 2 else 4]
+                errors[j, k] = (inputs.pose[j, k] - poses[j, k]) / inputs.sd[3 if k < 2 else 4]
             j += 1
             continue
-        _wander(before, poses[j, 0], poses[j, 1], max(reel.pose_t[j] - before[2], 0.0), reel.walk, spread)
+        _grow_covariance(
+            before, poses[j, 0], poses[j, 1], max(inputs.pose_t[j] - before[2], 0.0), inputs.walk, spread
+        )
         shift[:] = 0.0
         for k in range(3):
-            variance = reel.sd[3 if k < 2 else 4] ** 2
-            innovation = reel.pose[j, k] - poses[j, k] - shift[k]
+            variance = inputs.sd[3 if k < 2 else 4] ** 2
+            innovation = inputs.pose[j, k] - poses[j, k] - shift[k]
             total = spread[k, k] + variance
             errors[j, k] = innovation / math.sqrt(total)
             if math.isnan(innovation):
@@ -195,7 +193,7 @@ def _see_poses(
         _rebase(s, p, shift)
         before[0] = poses[j, 0] + shift[0]
         before[1] = poses[j, 1] + shift[1]
-        before[2] = reel.pose_t[j]
+        before[2] = inputs.pose_t[j]
         j += 1
     return j
 
@@ -217,8 +215,8 @@ def _rebase(s: Any, p: Any, shift: Array) -> None:
 
 
 @compiled
-def follow(
-    reel: Reel,
+def replay_rows(
+    inputs: KernelInput,
     physics: npt.NDArray[Any],
     derived: npt.NDArray[Any],
     state: npt.NDArray[Any],
@@ -234,7 +232,7 @@ def follow(
 
     Parameters
     ----------
-    reel
+    inputs
         The recording.
     physics, derived, state
         Records, shape (1,) each; the last two are overwritten.
@@ -260,26 +258,28 @@ def follow(
     shift = np.zeros(3)
     for k in range(3):
         spread[k, k] = 0.01  # the start pose is known to 0.1 m and 6 degrees: to nothing, beside what follows
-    i = _see_rows(0, 0.0, stretch, reel, s, p, rows, row_errors, last)
-    j = _see_poses(0, 0.0, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)
+    i = _compare_rows(0, 0.0, stretch, inputs, s, p, rows, row_errors, last)
+    j = _compare_poses(0, 0.0, stretch, late, inputs, s, p, poses, pose_errors, before, spread, shift)
     at = -1
     n = 0
-    while (i < reel.t.shape[0] or j < reel.pose_t.shape[0]) and n < 100_000_000:
+    while (i < inputs.t.shape[0] or j < inputs.pose_t.shape[0]) and n < 100_000_000:
         # Velocities live at mid-step: commands from the last middle to this one, less the delay, on the log's clock.
         begin = ((n - 0.5) * dt - p.actuation_delay) / stretch
         end = ((n + 0.5) * dt - p.actuation_delay) / stretch
-        while at + 1 < reel.t.shape[0] and reel.t[at + 1] <= begin:
+        while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
             at += 1
         share = stretch / dt
-        left = _held(reel.commands, reel.t, 0, at, begin, end, p.duty_cap) * share
-        right = _held(reel.commands, reel.t, 1, at, begin, end, p.duty_cap) * share
-        if reel.bench:
+        left = _held(inputs.commands, inputs.t, 0, at, begin, end, p.duty_cap) * share
+        right = _held(inputs.commands, inputs.t, 1, at, begin, end, p.duty_cap) * share
+        if inputs.bench:
             bench_step(s, left, right, p, c)
         else:
             step(s, left, right, p, c)
             drift(s, c)
         n += 1
-        if i < reel.t.shape[0] and reel.t[i] * stretch <= n * dt + 1e-9:
-            i = _see_rows(i, n * dt, stretch, reel, s, p, rows, row_errors, last)
-        if j < reel.pose_t.shape[0] and (reel.pose_t[j] - late) * stretch <= n * dt + 1e-9:
-            j = _see_poses(j, n * dt, stretch, late, reel, s, p, poses, pose_errors, before, spread, shift)
+        if i < inputs.t.shape[0] and inputs.t[i] * stretch <= n * dt + 1e-9:
+            i = _compare_rows(i, n * dt, stretch, inputs, s, p, rows, row_errors, last)
+        if j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= n * dt + 1e-9:
+            j = _compare_poses(
+                j, n * dt, stretch, late, inputs, s, p, poses, pose_errors, before, spread, shift
+            )

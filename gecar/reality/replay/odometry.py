@@ -1,4 +1,4 @@
-"""The path a robot took by its own account: simulated motion, corrected by what the wheels were measured to turn."""
+"""Odometry: simulated motion, corrected by what the encoders counted beyond it."""
 
 from __future__ import annotations
 
@@ -7,25 +7,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.recordings.dead_reckoning import integrated
 from gecar.reality.replay.kernel import HEADING, X, Y
-from gecar.reality.replay.replayer import Film
+from gecar.reality.replay.replayer import Replayer
 
 Array = npt.NDArray[np.float64]
 SMOOTH_ROWS = 5  # whole degrees of an encoder are smoothed over so many rows
 
 
-def odometry(film: Film, physics: npt.NDArray[Any]) -> Array:
+def odometry(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
     """Return the axle centre's pose at every row by dead reckoning, shape (rows, 3) [m, m, rad].
 
-    What slides and swings is simulated; what the encoders counted besides rolls. It begins where the film starts.
-
-    Source: midpoint dead reckoning of a differential drive, Siegwart, Nourbakhsh, Scaramuzza, Introduction to
-    Autonomous Mobile Robots (2nd ed.), section 5.2.4.
+    Slip and the body's swing are simulated; what the encoders counted beyond the simulation is taken for rolling.
     """
-    rows = film.open_loop().play(physics)[0]
+    rows = replayer.open_loop().play(physics).rows
     p = physics[0]
-    measured = film.reel.measured[len(film.reel.t) - len(film.t) :, :2]
-    rolled = np.column_stack([_smoothed(measured[:, k] - rows[:, k], film.t) for k in range(2)])
+    measured = replayer.measured[:, :2]
+    rolled = np.column_stack([_smoothed(measured[:, k] - rows[:, k], replayer.t) for k in range(2)])
     radius = p["wheel_radius"] * p["radius_scale"]
     rolled = np.diff(rolled * radius * (1.0 + 0.5 * p["radius_difference"] * np.array([-1.0, 1.0])), axis=0)
     pose = rows[:, [X, Y, HEADING]]
@@ -34,11 +32,7 @@ def odometry(film: Film, physics: npt.NDArray[Any]) -> Array:
     ahead = move[:, 0] * np.cos(middle) + move[:, 1] * np.sin(middle) + rolled.mean(axis=1)
     aside = move[:, 1] * np.cos(middle) - move[:, 0] * np.sin(middle)
     turn = move[:, 2] + (rolled[:, 1] - rolled[:, 0]) / (p["track_width"] * p["track_scale"])
-    heading = pose[0, 2] + np.r_[0.0, np.cumsum(turn)]
-    middle = heading[:-1] + 0.5 * turn
-    x = pose[0, 0] + np.r_[0.0, np.cumsum(ahead * np.cos(middle) - aside * np.sin(middle))]
-    y = pose[0, 1] + np.r_[0.0, np.cumsum(ahead * np.sin(middle) + aside * np.cos(middle))]
-    return np.column_stack([x, y, heading])
+    return integrated(ahead, aside, turn, pose[0])
 
 
 def _smoothed(values: Array, t: Array) -> Array:

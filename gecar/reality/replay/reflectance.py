@@ -47,7 +47,7 @@ def _clipped_mean(level: float, sd: float) -> float:
 
 
 @compiled
-def look_along(
+def readings_along(
     t: Array,
     path: Array,
     late: float,

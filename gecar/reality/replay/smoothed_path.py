@@ -8,27 +8,27 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.replay.kernel import HEADING, X, Y
-from gecar.reality.replay.replayer import Film
+from gecar.reality.replay.replayer import Replayer
 
 Array = npt.NDArray[np.float64]
 # Over this the difference between camera and replay is averaged: long against a frame, short against an error's growth.
 SMOOTH_S = 0.12
 
 
-def measured_path(film: Film, physics: npt.NDArray[Any]) -> Array:
+def measured_path(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
     """Return the axle centre's pose at every row, shape (rows, 3) [m, m, rad], on the brick's clock.
 
     A following replay gives the shape between frames; what the camera says besides is smoothed forwards and backwards,
     so that the path neither lags nor carries the camera's noise.
     """
-    rows = film.play(physics)[0]
+    rows = replayer.play(physics).rows
     path: Array = rows[:, [X, Y, HEADING]].copy()
-    late = float(physics["pose_delay"][0]) + film.offset_s
-    t = film.reel.pose_t - late
+    late = float(physics["pose_delay"][0]) + replayer.clock_offset_s
+    t = replayer.inputs.pose_t - late
     for k in range(3):
-        seen = ~np.isnan(film.reel.pose[:, k])
-        replayed = np.interp(t[seen], film.t, path[:, k])
-        path[:, k] += _smoothed(t[seen], film.reel.pose[seen, k] - replayed, film.t)
+        seen = ~np.isnan(replayer.inputs.pose[:, k])
+        replayed = np.interp(t[seen], replayer.t, path[:, k])
+        path[:, k] += _smoothed(t[seen], replayer.inputs.pose[seen, k] - replayed, replayer.t)
     return path
 
 

@@ -1,84 +1,164 @@
-"""Recordings side by side with their replays: the residuals every later stage works on."""
+"""Whitened residuals of several recordings together: what effects are fitted to.
+
+Readings of the colour sensor are compared along the measured path, so that what moves the robot and what the sensor
+sees are separated: effects of one kind do not change residuals of the other.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.residuals.of_recording import Cells, Strip
+from gecar.reality.noise.sensor_noise import Noise
+from gecar.reality.recordings.recording import Recording
+from gecar.reality.replay.channels import ResidualIndex
+from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
+from gecar.reality.residuals.threads import Threads
+from gecar.world.course import Course, load_course
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Physics = npt.NDArray[Any]
+
+LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
-class Comparison:
-    """Recordings side by side with their replays, in motion or in what the colour sensor saw.
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals of motion, or of the colour sensor, of several recordings.
 
-    Sight is compared along the measured path, so that what moves the robot and what blinds it come apart: neither
-    kind of effect changes the other's residuals.
-
-    Parameters
+    Attributes
     ----------
-    strips
-        The recordings.
-    sight
-        Whether to compare what the colour sensor saw, or the motion.
-    pool
-        Threads that replay.
+    recordings
+        Each beside its simulation.
+    sensor
+        Whether they are the colour sensor's.
+    threads
+        Replay the recordings.
     """
 
-    def __init__(self, strips: Sequence[Strip], sight: bool, pool: ThreadPoolExecutor) -> None:
-        self.strips = tuple(s for s in strips if s.looks) if sight else tuple(strips)
-        self.sight = sight
-        self._pool = pool
-        self._keep: npt.NDArray[np.bool_] = np.zeros(0, np.bool_)
-        self.replays = 0
+    recordings: tuple[RecordingResiduals, ...]
+    sensor: bool
+    threads: Threads = field(default_factory=Threads, compare=False)
 
-    def set_path(self, physics: npt.NDArray[Any], colour: Array | None = None) -> None:
-        """Set the path sight is based on: as a model sees it, with noise of a colour."""
-        for strip in self.strips:
-            strip.path_colour = np.ones(3) if colour is None else np.sqrt(colour)
-        list(self._pool.map(lambda strip: strip.set_path(physics), self.strips))
-        self._keep = np.zeros(0, np.bool_)
+    def errors(self, physics: Physics) -> Array:
+        """Return the whitened residuals, shape (n,); samples that were not measured are left out."""
+        if not self.recordings:
+            return np.zeros(0)
+        parts = self.threads.map(
+            lambda r: r.sensor_errors(physics) if self.sensor else r.motion_errors(physics), self.recordings
+        )
+        everything = np.concatenate(parts)[self._located[1]]
+        return np.clip(np.nan_to_num(everything, nan=LARGEST), -LARGEST, LARGEST)
 
-    def errors(self, physics: npt.NDArray[Any]) -> Array:
-        """Return the whitened residuals, shape (n,); samples that are not there are left out."""
-        self.replays += len(self.strips)
-        parts = list(self._pool.map(lambda strip: strip.errors(physics, self.sight), self.strips))
-        everything = np.concatenate(parts) if parts else np.zeros(0)
-        if len(self._keep) != len(everything):
-            self._keep = ~np.isnan(everything)
-        return np.clip(np.nan_to_num(everything[self._keep], nan=1e3), -1e3, 1e3)
+    @cached_property
+    def _located(self) -> tuple[ResidualIndex, Mask]:
+        """Where each residual comes from, and which of all samples they are."""
+        parts = [
+            r.sensor_index(k) if self.sensor else r.motion_index(k) for k, r in enumerate(self.recordings)
+        ]
+        if not parts:
+            return ResidualIndex(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0)), np.zeros(0, bool)
+        there = np.concatenate([mask for _, mask in parts])
+        whole = ResidualIndex(
+            *(np.concatenate([getattr(i, f) for i, _ in parts]) for f in ("recording", "channel", "t_s"))
+        )
+        return whole.kept(there), there
+
+    @property
+    def index(self) -> ResidualIndex:
+        """Where each residual comes from."""
+        return self._located[0]
 
     @property
     def reading_sd(self) -> Array:
-        """How uncertain each residual of sight is, the path's part included [%], shape (n,); known after `errors`."""
-        return np.concatenate([strip.reading_sd for strip in self.strips])[self._keep]
+        """Standard deviation of each reading, the path's uncertainty included, shape (n,) [%]; of sensor residuals."""
+        paths = [r.nuisances.path for r in self.recordings]
+        return np.concatenate([path.reading_sd for path in paths if path is not None])[self._located[1]]
 
     @property
-    def offsets(self) -> Array:
+    def clock_offsets_s(self) -> Array:
         """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
-        return np.array([strip.film.offset_s for strip in self.strips])
+        return np.array([r.nuisances.clock_offset_s for r in self.recordings])
 
-    def set_offsets(self, offsets: Array) -> None:
-        """Take the camera clocks to be late by so much [s]."""
-        for strip, offset in zip(self.strips, offsets, strict=True):
-            strip.film.offset_s = float(offset)
+    def with_clock_offsets(self, offsets_s: Array) -> Residuals:
+        """Return these with other camera clocks, shape (recordings,) [s]."""
+        changed = [
+            r.with_nuisances(replace(r.nuisances, clock_offset_s=float(offset)))
+            for r, offset in zip(self.recordings, offsets_s, strict=True)
+        ]
+        return replace(self, recordings=tuple(changed))
 
-    def set_mark(self, mark: Array) -> None:
-        """Take the poses to be those of a camera's mark on the robot; see `axle_pose`."""
-        for strip in self.strips:
-            strip.film.set_mark(mark)
+    def with_mark(self, mark: Sequence[float] | Array) -> Residuals:
+        """Return these with the poses taken for those of a camera's mark on the robot; see `axle_pose`."""
+        ahead, left, turn = (float(part) for part in mark)
+        changed = [r.with_nuisances(replace(r.nuisances, mark=(ahead, left, turn))) for r in self.recordings]
+        return replace(self, recordings=tuple(changed))
 
-    @property
-    def cells(self) -> Cells:
-        """Where each residual comes from; known after the first `errors`."""
-        parts = [strip.cells(i, self.sight) for i, strip in enumerate(self.strips)]
-        return Cells(
-            np.concatenate([c.recording for c in parts])[self._keep],
-            np.concatenate([c.channel for c in parts])[self._keep],
-            np.concatenate([c.t_s for c in parts])[self._keep],
+    def localised(self, physics: Physics) -> Residuals:
+        """Return these with start poses found from readings where no camera looked."""
+        return replace(
+            self, recordings=tuple(self.threads.map(lambda r: r.localised(physics), self.recordings))
         )
+
+    def with_paths(self, physics: Physics, inflation: Array | None = None) -> Residuals:
+        """Return these with the paths along which readings are predicted, as a model of the motion gives them.
+
+        Parameters
+        ----------
+        physics
+            That model, shape (1,).
+        inflation
+            By how much slow noise of x, y and heading exceeds white noise (variances), shape (3,); default: 1.
+        """
+        slow = np.ones(3) if inflation is None else inflation
+        along = self.threads.map(lambda r: r.with_path(physics, slow), self.recordings)
+        return replace(self, recordings=tuple(along))
+
+    def of_sensor(self) -> Residuals:
+        """Return the colour sensor's residuals of the recordings that have any; they need paths."""
+        return replace(self, recordings=tuple(r for r in self.recordings if r.reads), sensor=True)
+
+
+def motion_residuals(
+    recordings: Sequence[Recording],
+    noise: Noise,
+    memory_s: float,
+    threads: Threads,
+    bench_memory_s: float | None = None,
+) -> Residuals:
+    """Return the residuals of motion of recordings, each on the course it names.
+
+    Parameters
+    ----------
+    recordings, noise
+        What was measured, and how noisy it is.
+    memory_s
+        Over how long replays are drawn back to the measurement [s].
+    threads
+        Replay the recordings.
+    bench_memory_s
+        The same for recordings made on a bench; default: the same.
+
+    Raises
+    ------
+    InputError
+        If a course file is missing or wrong.
+    """
+    courses: dict[str, Course | None] = {}
+    for recording in recordings:
+        name = recording.setup.course
+        if name not in courses:
+            needed = recording.setup.rig == "floor" and name != "none"
+            courses[name] = load_course(name) if needed else None
+    on_bench = memory_s if bench_memory_s is None else bench_memory_s
+    beside = tuple(
+        residuals_of(r, noise, on_bench if r.setup.rig == "bench" else memory_s, courses[r.setup.course])
+        for r in recordings
+    )
+    return Residuals(beside, sensor=False, threads=threads)

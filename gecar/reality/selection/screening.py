@@ -1,4 +1,4 @@
-"""Trying every effect of the catalogue on top of a model: scored by all, fitted by the most promising."""
+"""Screening: every effect of the catalogue scored on top of a model; the most promising are fitted in full."""
 
 from __future__ import annotations
 
@@ -8,59 +8,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.estimator import ROUGH_SPREAD, Fits
-from gecar.reality.fitting.initial_values import starts
-from gecar.reality.fitting.model import Model, Step, worthwhile
-from gecar.reality.fitting.model_tolerance import shifts
-from gecar.reality.fitting.parameters import Freedom, free
-from gecar.reality.optimisation.cma_es import rough_search
-from gecar.reality.optimisation.least_squares import Fit, cost, fit, weights
-from gecar.reality.recordings.recording import Recording
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.initial_values import initial_values
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.fitting.parameters import Parameters
+from gecar.reality.fitting.parameters import free as free_parameters
+from gecar.reality.optimisation.cma_es import cma_es
+from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares
+from gecar.reality.selection.acceptance import is_worthwhile, worthwhile
+from gecar.reality.selection.model_tolerance import tolerated
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.thresholds import (
+    COMPETING,
+    DOUBTFUL_FIT,
+    NEGLIGIBLE,
+    REFITTED,
+    SCREENED,
+    SEARCHED,
+)
+from gecar.world.effects import BY_ID, Search
 
 Array = npt.NDArray[np.float64]
 
-BEGUN, REFITTED = 10, 5
-LEAST_GAIN = 0.02  # of cost, a block: less is not worth fitting
-# Effects on whose landscape slopes mislead: slip, play, stiction, thresholds, an edge on the floor, waves.
-ROUGH = frozenset(
-    {"slippery_patch", "backlash", "static_friction", "dead_band", "tyre_friction", "torque_ripple"}
-)
-ROUGH_SHARE = 0.3  # of the best effect's gain: less is not worth the search
 SHORT = 8  # generations of a first search
-STUCK, STUCK_SPREAD = (
-    1.5,
-    1.5,
-)  # structure a block that makes a fit doubtful; how far about it is then searched
-
-
-@dataclass(frozen=True)
-class _Ground:
-    """How rough ground is searched.
-
-    ``apart``: how far places begun from are from each other [coordinates]; ``restarts``: how many they are at most;
-    ``finalists``: how many of them are searched on, for ``generations`` of ``wider`` times as many trials.
-    """
-
-    apart: float = 5.5
-    restarts: int = 6
-    finalists: int = 2
-    generations: int = 22
-    wider: int = 1
-
-
-USUAL = _Ground()
-# A patch's edge makes many valleys close together; with fewer finalists three seeds ended in three places.
-GROUNDS = {"slippery_patch": _Ground(1.5, 12, 6, 40, 3)}
+FINALIST_SPREAD = 0.6  # of a parameter's search spread, for the second search
+DOUBTFUL_SPREAD = 1.5  # of a parameter's search spread, about a fit that leaves much
+USUAL = Search()
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """An effect's first fit, and the best places to search from."""
+    """An effect on top of a model: the best starting values, where a first fit ended, and the gain it promises."""
 
     effects: tuple[str, ...]
-    freedom: Freedom
-    fit: Fit
-    places: tuple[Array, ...]
+    parameters: Parameters
+    minimum: Minimum
+    starts: tuple[Array, ...]
     promise: float
     base: Model
 
@@ -69,132 +52,144 @@ class _Trial:
         return self.effects[-1]
 
     @property
+    def gain(self) -> float:
+        return self.base.cost - self.minimum.cost
+
+    @property
     def values(self) -> dict[str, dict[str, float]]:
-        return self.freedom.values(self.fit.z)
+        return self.parameters.values(self.minimum.z)
+
+    @property
+    def search(self) -> Search | None:
+        return BY_ID[self.effect].search
 
 
-def steps(fits: Fits, catalogue: Sequence[str], recordings: Sequence[Recording], model: Model) -> list[Step]:
-    """Try every other effect on top of a model; the most promising are refitted in full. Best first."""
-    taken_off = shifts(fits, catalogue, model)
-    others = [e for e in catalogue if e not in model.effects]
-    bases = {e: fits.shifted(model, taken_off[e]) for e in others}
-    rough = [t for t in (_screen(fits, recordings, bases[e], e) for e in others) if t]
-    rough.sort(key=lambda t: -t.promise)
-    if not rough or rough[0].promise < LEAST_GAIN * fits.blocks.count:
+def candidate_steps(problem: Problem, model: Model) -> list[Step]:
+    """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
+    estimator, small = problem.estimator, tolerated(problem, model)
+    others = [e for e in problem.catalogue if e not in model.effects]
+    bases = {e: estimator.tolerating(model, small[e]) for e in others}
+    trials = [t for t in (_scored(problem, bases[e], e) for e in others) if t]
+    trials.sort(key=lambda t: -t.promise)
+    if not trials or trials[0].promise < NEGLIGIBLE * problem.blocks:
         return []
-    begun = [_begin(fits, t) for t in rough[:BEGUN]]
-    begun.sort(key=lambda t: t.fit.cost)
-    gains = [t.base.cost - t.fit.cost for t in begun]
+    begun = [_improved(estimator, t) for t in trials[: int(SCREENED)]]
+    begun.sort(key=lambda t: t.minimum.cost)
     # What is too small for a name may gain by imitating much; it must not shut the others out.
-    best = max((g for t, g in zip(begun, gains, strict=True) if worthwhile(t, t.effect)), default=max(gains))
-    done = []
-    for trial, gain in list(zip(begun, gains, strict=True))[:REFITTED]:
-        if gain < 0.02 * best:
-            continue
-        search = trial.effect in ROUGH and gain > ROUGH_SHARE * best and best > 0.05 * model.cost
-        found = (
-            _search(fits, trial)
-            if search
-            else fits.refit(trial.effects, trial.values, shift=trial.base.shift)
+    named = [t.gain for t in begun if worthwhile(t.parameters, t.minimum.z, t.effect)]
+    best = max(named, default=max(t.gain for t in begun))
+    steps = [
+        _step(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
+        for t in begun[: int(REFITTED)]
+        if t.gain >= NEGLIGIBLE * best
+    ]
+    steps.sort(key=lambda s: -s.gain)
+    if steps and steps[0].model.excess_energy > DOUBTFUL_FIT * problem.blocks:
+        steps[0] = _step(
+            estimator, steps[0].effect, steps[0].base, _searched_about(estimator, steps[0].model)
         )
-        done.append(_step(fits, trial.effect, trial.base, found))
-    done.sort(key=lambda s: -s.gain)
-    if done and done[0].model.structure > STUCK * fits.blocks.count:
-        done[0] = _step(fits, done[0].effect, done[0].base, _unstuck(fits, done[0].model))
-    return done
+    return steps
 
 
-def _screen(fits: Fits, recordings: Sequence[Recording], model: Model, effect: str) -> _Trial | None:
-    """Score an effect without fitting it: by its slopes at the model, and by trying its starts."""
-    freedom = free(fits.robot, (*model.effects, effect))
-    residual = fits.residual(freedom, model.shift)
+def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
+    """Score an effect without fitting it: by its sensitivities at the model, and by trying its starting values."""
+    estimator = problem.estimator
+    parameters = free_parameters(estimator.robot, (*model.effects, effect))
+    residual = estimator.residual(parameters, model.tolerated)
 
-    def place(values: Mapping[str, float]) -> Array:
-        return freedom.vector({**model.values, effect: values})
+    def vector(values: Mapping[str, float]) -> Array:
+        return parameters.vector({**model.values, effect: values})
 
-    begun = starts(effect, fits.robot, recordings, lambda values: residual(place(values)))
-    places = [place(values) for values in begun]
-    if not places:
-        return None
-    found = np.array([cost(residual(z)) for z in places])
-    order = np.argsort(found)
-    ground = GROUNDS.get(effect, USUAL)
-    kept = _apart([places[k] for k in order], ground.restarts, ground.apart)
-    slopes = fits.felt(model, effect)
-    linear = _linear_gain(fits, model, slopes)
-    promise = max(linear, model.cost - float(found[order[0]]))
-    return _Trial((*model.effects, effect), freedom, Fit(kept[0], model.fit.errors, slopes, float(found[order[0]])),
-                  kept, promise, model)  # fmt: skip
-
-
-def _linear_gain(fits: Fits, model: Model, slopes: Array) -> float:
-    """Return the gain the slopes alone promise, beside the model's own parameters."""
-    w = np.sqrt(weights(model.fit.errors))
-    g = fits.beside(model, slopes * w[:, None])
-    if not g.shape[1]:
-        return 0.0
-    q = np.linalg.qr(g)[0]
-    return 0.5 * float(np.sum((q.T @ (w * model.fit.errors)) ** 2))
-
-
-def _begin(fits: Fits, trial: _Trial) -> _Trial:
-    """Improve an effect's best start by two rounds."""
-    first = fit(
-        fits.residual(trial.freedom, trial.base.shift),
-        trial.places[0],
-        trial.freedom.bounds,
-        trial.freedom.probes,
-        rounds=2,
+    values = initial_values(
+        effect, estimator.robot, problem.recordings, lambda tried: residual(vector(tried))
     )
-    return replace(trial, fit=first)
+    starts = [vector(each) for each in values]
+    if not starts:
+        return None
+    found = np.array([cost(residual(z)) for z in starts])
+    order = np.argsort(found)
+    search = BY_ID[effect].search or USUAL
+    kept = _apart([starts[k] for k in order], search.restarts, search.apart)
+    least = float(found[order[0]])
+    promise = max(estimator.linear_gain(model, effect), model.cost - least)
+    start = Minimum(kept[0], model.errors, least)
+    return _Trial((*model.effects, effect), parameters, start, kept, promise, model)
 
 
-def _search(fits: Fits, trial: _Trial) -> Model:
-    """Fit an effect whose landscape is rough: from several starts without slopes, then with them."""
-    model, freedom, residual = trial.base, trial.freedom, fits.residual(trial.freedom, trial.base.shift)
-    own = slice(len(model.fit.z), None)
-    spread = np.array([ROUGH_SPREAD.get(c.parameter.field, 1.0) for c in freedom.coordinates[own]])
-    low, high = freedom.bounds
+def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
+    """Improve an effect's best start by two iterations."""
+    residual = estimator.residual(trial.parameters, trial.base.tolerated)
+    bounds, probes = trial.parameters.bounds, trial.parameters.probes
+    return replace(trial, minimum=least_squares(residual, trial.starts[0], bounds, probes, rounds=2))
+
+
+def _fitted(estimator: Estimator, trial: _Trial, best: float, model: Model) -> Model:
+    """Fit an effect in full; search without derivatives where they mislead and the effect is a rival."""
+    if trial.search and trial.gain > COMPETING * best and best > SEARCHED * model.cost:
+        return _searched(estimator, trial, trial.search)
+    return estimator.fit(trial.effects, trial.values, tolerated=trial.base.tolerated)
+
+
+def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:
+    """Fit an effect from several starts without derivatives, then with them."""
+    model, parameters = trial.base, trial.parameters
+    residual = estimator.residual(parameters, model.tolerated)
+    own = slice(len(model.z), None)
+    spread = np.array([c.parameter.search_spread for c in parameters.coordinates[own]])
+    low, high = parameters.bounds
+    bounds = (low[own], high[own])
 
     def cost_of(tail: Array) -> float:
-        return cost(residual(np.r_[model.fit.z, tail]))
+        return cost(residual(np.r_[model.z, tail]))
 
-    bounds = (low[own], high[own])
-    short = [
-        rough_search(cost_of, z[own], spread, bounds, fits.rng, SHORT) for z in (*trial.places, trial.fit.z)
-    ]
+    starts = (*trial.starts, trial.minimum.z)
+    short = [cma_es(cost_of, z[own], spread, bounds, estimator.rng, SHORT) for z in starts]
     short.sort(key=lambda pair: pair[1])
-    best, least = trial.fit.z, trial.fit.cost
-    ground = GROUNDS.get(trial.effect, USUAL)
-    for place, _ in short[: ground.finalists]:
-        tail, found = rough_search(
-            cost_of, place, 0.6 * spread, bounds, fits.rng, ground.generations, ground.wider
+    best, least = trial.minimum.z, trial.minimum.cost
+    for start, _ in short[: search.finalists]:
+        tail, found = cma_es(
+            cost_of,
+            start,
+            FINALIST_SPREAD * spread,
+            bounds,
+            estimator.rng,
+            search.generations,
+            search.trials_factor,
         )
         if found < least:
-            best, least = np.r_[model.fit.z, tail], found
-    return fits.polished(fits.refit(trial.effects, freedom.values(best), shift=model.shift))
+            best, least = np.r_[model.z, tail], found
+    refined = estimator.fit(trial.effects, parameters.values(best), tolerated=model.tolerated)
+    return estimator.searched(refined)
 
 
-def _unstuck(fits: Fits, model: Model) -> Model:
+def _searched_about(estimator: Estimator, model: Model) -> Model:
     """Search about a fit that leaves much, and fit on from there."""
-    again = fits.polished(model, STUCK_SPREAD)
+    again = estimator.searched(model, DOUBTFUL_SPREAD)
     if again is model:
         return model
-    found = fits.refit(again.effects, again.values, shift=again.shift)
+    found = estimator.fit(again.effects, again.values, tolerated=again.tolerated)
     return found if found.cost < again.cost else again
 
 
-def _step(fits: Fits, effect: str, base: Model, found: Model) -> Step:
-    colour = fits.blocks.colour(found.fit.errors)
-    before, after = (fits.blocks.structure(m.fit.errors, colour) for m in (base, found))
-    size = worthwhile(found, effect)
-    return Step(effect, base, found, base.cost - found.cost, worthwhile=size, before=before, after=after)
+def _step(estimator: Estimator, effect: str, base: Model, found: Model) -> Step:
+    inflation = estimator.blocks.inflation(found.errors)
+    before, after = (estimator.blocks.excess_energy(m.errors, inflation) for m in (base, found))
+    size = is_worthwhile(found, effect)
+    return Step(
+        effect,
+        base,
+        found,
+        base.cost - found.cost,
+        worthwhile=size,
+        energy_before=before,
+        energy_after=after,
+    )
 
 
-def _apart(places: Sequence[Array], count: int, distance: float) -> tuple[Array, ...]:
-    """Return the first few places that are no neighbours of each other."""
+def _apart(starts: Sequence[Array], count: int, distance: float) -> tuple[Array, ...]:
+    """Return the first few starts that are no neighbours of each other."""
     kept: list[Array] = []
-    for place in places:
-        if len(kept) < count and all(np.max(np.abs(place - other)) > distance for other in kept):
-            kept.append(place)
+    for start in starts:
+        if len(kept) < count and all(np.max(np.abs(start - other)) > distance for other in kept):
+            kept.append(start)
     return tuple(kept)

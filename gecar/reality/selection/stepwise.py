@@ -1,220 +1,205 @@
-"""The chain of steps from the bare robot to what explains a comparison, and when to abstain."""
+"""Stepwise selection: effects added one by one while each proves itself, then swapped and dropped; or none named.
+
+Source: forward, backward and stepwise selection, Draper and Smith, Applied Regression Analysis (3rd ed.), ch. 15.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from gecar.reality.fitting.model import Model, Step, worthwhile
-from gecar.reality.locate.hotspot import Spot, stands_out
-from gecar.reality.selection.screening import ROUGH
-from gecar.reality.selection.selection import Selection
-
-MOST_EFFECTS = 4
-MOST_ON_BENCH = 7  # a motor alone is known to tenths of a percent, and shows all its parts
-WAYS = 3  # of the first stage's effects a chain may begin with
-FAR_BEHIND = 0.3  # of the best gain: no way to begin with less
-NEARLY_STOOD = 0.75  # of the structure: a chain that explains so much is worth another beginning
-SWAPPED = 4  # of each stage's runners-up are tried in the place of what was taken
-
-
-NEARLY = 0.8  # of the best effect's gain: clocks that gain this come first
-MORE_THAN_COMMON = 1.3  # times the gain of one delay common to all: what clocks must gain
-MAIN_SHARE = 0.35  # of what is left: what an effect explains that is no stand-in
-WHOLE_SHARE = 0.85  # of all: where several effects together explain this, each may explain less
-# Where nearly all is explained already, one more effect must explain this much of what is left above the floor: in
-# pairs of a 3D engine the second cause explains 80 to 99 %, what the first one's model lacks is imitated to 20 to 50 %.
-MORE_SHARE = 0.6
-UNEXPLAINED_SHARE = 0.1
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.selection.acceptance import candidates, is_worthwhile, number_accepted, proved
+from gecar.reality.selection.cross_validation import judged
+from gecar.reality.selection.model_tolerance import without_tolerated
+from gecar.reality.selection.problem import COMMON_DELAY, Problem
+from gecar.reality.selection.screening import candidate_steps
+from gecar.reality.selection.thresholds import (
+    BEGINNINGS,
+    CLOCKS_FIRST,
+    CLOCKS_OVER_COMMON,
+    COMPETING,
+    MAIN_SHARE,
+    MOST_EFFECTS,
+    MOST_ON_BENCH,
+    NEARLY_WHOLE,
+    RUNNERS_UP,
+    UNEXPLAINED_SHARE,
+)
+from gecar.world.effects import BY_ID
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What explains a comparison.
+    """What explains a problem's residuals.
 
     Attributes
     ----------
+    problem
+        The problem, with the camera's clocks fitted if they had to be.
     taken
         The model with the effects that were taken.
+    left
+        The same, rid of what changes too small for a name explain.
     steps
         How they were taken, in order.
     tried
-        Everything refitted at each stage, for runners-up.
+        Everything fitted at each stage, for runners-up.
     unexplained
-        Whether structure is left that no effect explains.
+        Whether excess energy is left that no effect explains.
     spot
-        Where on the floor, if it is left at one place only.
+        Where on the floor it is left, if at one place only: x, y [m].
     """
 
+    problem: Problem
     taken: Model
+    left: Model
     steps: tuple[Step, ...]
     tried: tuple[tuple[Step, ...], ...]
     unexplained: bool
-    spot: Spot | None = None
+    spot: tuple[float, float] | None = None
 
 
-def explain(selection: Selection) -> Explanation:
+def explain(problem: Problem) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate.
 
-    Where it takes several, other ways to begin are tried, too: the first effect may have stood in for two causes.
+    Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
     """
-    first = selection.steps(selection.nothing) if _worth_a_look(selection, selection.nothing) else []
-    common = max((step.gain for step in first if step.effect == "pose_delay"), default=0.0)
-    if selection.align(
-        selection.nothing, max(NEARLY * first[0].gain, MORE_THAN_COMMON * common) if first else 0.0
-    ):
-        selection.tell("the camera's clock differs from recording to recording: taken out")
-        return explain(selection)
-    began = _chain(selection, first)
-    if began is None:  # clocks came forward on the way
-        return explain(selection)
-    ways = [began]
-    if len(began.steps) > 1 or (not began.steps and began.nearly):
-        others = [
-            step for step in first[1:WAYS] if step.worthwhile and step.gain > FAR_BEHIND * first[0].gain
-        ]
-        ways += [way for way in (_chain(selection, [step]) for step in others) if way is not None]
-    best = _best_way(selection, [way for way in ways if way.steps] or ways)
-    kept = list(best.steps)
-    tried = [tuple(first), *best.tried[1:]]
-    taken = _settled(selection, kept, tried)
-    left = selection.rid_of_subtle(taken)
-    floor = max(
-        selection.limits.unexplained * selection.blocks.count,
-        UNEXPLAINED_SHARE * selection.nothing.structure,
-    )
-    if left.structure > floor or kept:
-        return Explanation(taken, tuple(kept), tuple(tried), left.structure > floor)
-    spot = stands_out(selection, left)
-    return Explanation(taken, (), tuple(tried), spot is not None, spot)
+    first = candidate_steps(problem, problem.known) if _worth_fitting(problem, problem.known) else []
+    with_clocks = _with_clocks(problem, problem.known, first)
+    if with_clocks is not None:
+        return explain(with_clocks)
+    chain = _forward(problem, first)
+    if chain.with_clocks is not None:
+        return explain(chain.with_clocks)
+    best = _shortest([chain, *_other_beginnings(problem, first, chain)], problem)
+    tried = (tuple(first), *best.tried[1:])
+    taken, steps = _swapped_and_dropped(problem, best.steps, tried)
+    left = without_tolerated(problem, taken)
+    floor = max(problem.limits.unexplained * problem.blocks, UNEXPLAINED_SHARE * problem.known.excess_energy)
+    return Explanation(problem, taken, left, steps, tried, left.excess_energy > floor)
 
 
 @dataclass(frozen=True)
-class _Way:
-    """One chain: the steps that stand, the model they end in, all that was tried, and whether it nearly stood."""
+class _Chain:
+    """One forward selection.
+
+    ``steps`` were accepted and end in ``model``; ``nearly`` says whether rejected ones explained nearly all;
+    ``with_clocks`` is the problem to begin anew, where the camera's clocks had to be fitted on the way.
+    """
 
     steps: tuple[Step, ...]
     model: Model
     tried: tuple[tuple[Step, ...], ...]
     nearly: bool
+    with_clocks: Problem | None = None
 
 
-def _best_way(selection: Selection, ways: list[_Way]) -> _Way:
-    """Return the way with the fewest effects, unless a longer one explains a good part of what that leaves."""
-    floor = selection.limits.floor * selection.blocks.count
-    ways = sorted(ways, key=lambda way: (len(way.steps), way.model.cost))
-    best = ways[0]
-    for way in ways[1:]:
-        longer = len(way.steps) > len(best.steps)
-        if longer and max(way.model.structure, floor) < (1.0 - MAIN_SHARE) * max(best.model.structure, floor):
-            best = way
+def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
+    """Go on from a first stage until nothing more proves itself."""
+    model, steps, tried = problem.known, list[Step](), list[tuple[Step, ...]]()
+    stage = tuple(first)
+    most = int(MOST_ON_BENCH if problem.on_bench else MOST_EFFECTS)
+    while True:
+        tried.append(stage)
+        step = _best(problem, stage)
+        if step is None:
+            break
+        problem.tell(f"{step.effect}: explains {step.drop / step.energy_before:.0%} of what is left")
+        steps.append(step)
+        model = step.model
+        if len(steps) == most or not _worth_fitting(problem, model):
+            break
+        stage = tuple(candidate_steps(problem, model))
+        with_clocks = _with_clocks(problem, model, stage)
+        if with_clocks is not None:
+            return _Chain((), problem.known, (), nearly=False, with_clocks=with_clocks)
+    accepted = tuple(steps[: number_accepted(problem, steps)])
+    before = steps[0].energy_before if steps else 0.0
+    nearly = bool(steps) and before - steps[-1].energy_after > NEARLY_WHOLE * before
+    return _Chain(accepted, accepted[-1].model if accepted else problem.known, tuple(tried), nearly)
+
+
+def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
+    """Return the best candidate that gains on left-out recordings; None if there is none."""
+    return next(filter(proved, (judged(problem, step) for step in candidates(problem, stage))), None)
+
+
+def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
+    """Return the chains that begin with a runner-up, where the first chain took several effects or nearly stood."""
+    if not (len(chain.steps) > 1 or (not chain.steps and chain.nearly)):
+        return []
+    rivals = [
+        step
+        for step in first[1 : int(BEGINNINGS)]
+        if step.worthwhile and step.gain > COMPETING * first[0].gain
+    ]
+    chains = [_forward(problem, [step]) for step in rivals]
+    return [other for other in chains if other.with_clocks is None]
+
+
+def _shortest(chains: Sequence[_Chain], problem: Problem) -> _Chain:
+    """Return the chain with the fewest effects, unless a longer one explains a good part of what that leaves."""
+    floor = problem.limits.floor * problem.blocks
+    accepted = [chain for chain in chains if chain.steps] or list(chains)
+    accepted.sort(key=lambda chain: (len(chain.steps), chain.model.cost))
+    best = accepted[0]
+    for chain in accepted[1:]:
+        left, more_left = (max(c.model.excess_energy, floor) for c in (chain, best))
+        if len(chain.steps) > len(best.steps) and left < (1.0 - MAIN_SHARE) * more_left:
+            best = chain
     return best
 
 
-def _chain(selection: Selection, first: list[Step]) -> _Way | None:
-    """Go on from a first stage until nothing more proves itself; None where the cameras' clocks had to be set."""
-    model, steps, tried = selection.nothing, list[Step](), list[tuple[Step, ...]]()
-    done = first
-    while True:
-        tried.append(tuple(done))
-        step = _best(selection, done)
-        if step is None:
-            break
-        selection.tell(f"{step.effect}: explains {1.0 - step.after / step.before:.0%} of what is left")
-        steps.append(step)
-        model = step.model
-        if len(steps) == _most(selection) or not _worth_a_look(selection, model):
-            break
-        done = selection.steps(model)
-        common = max((each.gain for each in done if each.effect == "pose_delay"), default=0.0)
-        if selection.align(model, max(NEARLY * done[0].gain, MORE_THAN_COMMON * common) if done else 0.0):
-            return None
-    kept = steps[: _kept(selection, steps)]
-    nearly = bool(steps) and steps[0].before - steps[-1].after > NEARLY_STOOD * steps[0].before
-    return _Way(tuple(kept), kept[-1].model if kept else selection.nothing, tuple(tried), nearly)
-
-
-def _most(selection: Selection) -> int:
-    return MOST_ON_BENCH if _on_bench(selection) else MOST_EFFECTS
-
-
-def _on_bench(selection: Selection) -> bool:
-    return all(r.setup.rig == "bench" for r in selection.recordings)
-
-
-def _worth_a_look(selection: Selection, model: Model) -> bool:
-    return model.structure > selection.limits.least_drop * selection.blocks.count
-
-
-def _settled(selection: Selection, kept: list[Step], tried: list[tuple[Step, ...]]) -> Model:
-    """Refit what was taken, with everything but the effects back at the robot's own constants.
+def _swapped_and_dropped(
+    problem: Problem, accepted: Sequence[Step], tried: Sequence[Sequence[Step]]
+) -> tuple[Model, tuple[Step, ...]]:
+    """Refit what was accepted, with everything but the effects back at the robot's own constants.
 
     An effect taken early may have stood in for a cause that only the later ones let come forward: each is swapped
     against its runners-up, and dropped where the others can do without it.
     """
-    if not kept:
-        return selection.nothing
-    best, null = kept[-1].model, kept[-1].null_95  # of what is left at the end; earlier ones are of what was
-    floor = selection.limits.floor * selection.blocks.count
-    rivals = {step.effect: step for stage in tried for step in stage[:SWAPPED]}
-    for number, step in enumerate(list(kept)):
-        if len(kept) < 2:
-            break
-        for other in rivals.values():
-            if other.effect in best.effects:
-                continue
-            rest = [e for e in best.effects if e != step.effect]
-            values = {**best.values, **other.model.values}
-            swapped = selection.refit((*rest, other.effect), values, shift=best.shift)
-            if swapped.cost < best.cost - null and worthwhile(swapped, other.effect):
-                best = swapped
-                kept[number] = replace(step, effect=other.effect)
-                break
-        else:
-            rest = [e for e in best.effects if e != step.effect]
-            without = selection.refit(rest, best.values, shift=best.shift)
-            if without.cost < best.cost + null or without.structure < floor:
-                best, kept[number] = without, replace(step, effect="")
-    kept[:] = [step for step in kept if step.effect]
-    found = selection.refit(best.effects, best.values)
-    return selection.polished(found) if ROUGH.intersection(found.effects) else found
-
-
-def _best(selection: Selection, done: list[Step]) -> Step | None:
-    """Return the best step worth a name that holds on left-out recordings; None if there is none."""
-    for step in done[:4]:
-        drop = step.before - step.after
-        if (
-            not all(worthwhile(step.model, effect) for effect in step.model.effects)
-            or drop < selection.limits.least_drop * selection.blocks.count
-            or step.gain < 0.3 * done[0].gain
-        ):
+    if not accepted:
+        return problem.known, ()
+    estimator, floor = problem.estimator, problem.limits.floor * problem.blocks
+    # The null distribution of what is left at the end; earlier ones are of what was left then.
+    steps, best, null = list(accepted), accepted[-1].model, accepted[-1].null_95
+    rivals = {step.effect: step for stage in tried for step in stage[: int(RUNNERS_UP)]}
+    for number, step in enumerate(accepted if len(accepted) > 1 else ()):
+        rest = [e for e in best.effects if e != step.effect]
+        swapped = _swapped(problem, best, rest, list(rivals.values()), best.cost - null)
+        if swapped is not None:
+            best, steps[number] = swapped, replace(step, effect=swapped.effects[-1])
             continue
-        judged = selection.judged(step)
-        if judged.left_out.sum() > judged.null_95 and judged.p < 0.05:
-            return judged
+        without = estimator.fit(rest, best.values, tolerated=best.tolerated)
+        if without.cost < best.cost + null or without.excess_energy < floor:
+            best, steps[number] = without, replace(step, effect="")
+    found = estimator.fit(best.effects, best.values)
+    if any(BY_ID[effect].search for effect in found.effects):
+        found = estimator.searched(found)
+    return found, tuple(step for step in steps if step.effect)
+
+
+def _swapped(
+    problem: Problem, best: Model, rest: Sequence[str], rivals: Sequence[Step], least: float
+) -> Model | None:
+    """Return the model with the first rival in an effect's place that costs less than ``least``; None: none does."""
+    for other in rivals:
+        if other.effect in best.effects:
+            continue
+        values = {**best.values, **other.model.values}
+        swapped = problem.estimator.fit((*rest, other.effect), values, tolerated=best.tolerated)
+        if swapped.cost < least and is_worthwhile(swapped, other.effect):
+            return swapped
     return None
 
 
-def _kept(selection: Selection, steps: list[Step]) -> int:
-    """Return how many steps of the chain stand.
+def _with_clocks(problem: Problem, model: Model, stage: Sequence[Step]) -> Problem | None:
+    """Return the problem with camera clocks fitted, where they gain as much as the best effect of a stage."""
+    common = max((step.gain for step in stage if step.effect == COMMON_DELAY), default=0.0)
+    least = max(CLOCKS_FIRST * stage[0].gain, CLOCKS_OVER_COMMON * common) if stage else 0.0
+    return problem.with_clocks(model, least)
 
-    Together they must explain nearly all there is; then each must explain a good part of what the others leave, or be
-    needed to get there.
-    """
-    if not steps:
-        return 0
-    limits = selection.limits
-    first = steps[0].before
-    excess = max(first - limits.floor * selection.blocks.count, limits.least_drop * selection.blocks.count)
-    kept, whole_before = 0, False
-    for number, step in enumerate(steps, start=1):
-        whole = first - step.after >= WHOLE_SHARE * excess
-        main = step.before - step.after >= MAIN_SHARE * step.before
-        if whole_before and not _on_bench(selection):
-            main &= step.before - step.after >= MORE_SHARE * (
-                step.before - limits.floor * selection.blocks.count
-            )
-        if whole and main and (not whole_before or kept == number - 1):
-            kept = number
-        whole_before = whole_before or whole
-    return kept
+
+def _worth_fitting(problem: Problem, model: Model) -> bool:
+    return model.excess_energy > problem.limits.least_drop * problem.blocks

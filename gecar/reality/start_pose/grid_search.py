@@ -27,13 +27,13 @@ NEAR_M, NEAR_RAD = 0.06, math.radians(8.0)  # what a fine scan covers
 SAME_M, SAME_RAD = 0.015, math.radians(2.0)  # a line has two edges, two centimetres apart
 
 
-def likely_starts(points: Array, seen: Array, course: Course, physics: Physics) -> list[Array]:
+def likely_starts(points: Array, read: Array, course: Course, physics: Physics) -> list[Array]:
     """Return the starts that fit best on a blurred floor, best first: over the whole course, then finely around.
 
     Parameters
     ----------
-    points, seen
-        Where the sensor was, seen from the start's pose [m], shape (n, 2), and what it read there [%], shape (n,).
+    points, read
+        Where the sensor was, read from the start's pose [m], shape (n, 2), and what it read there [%], shape (n,).
     course
         What was driven on; its own start is always looked at.
     physics
@@ -44,13 +44,13 @@ def likely_starts(points: Array, seen: Array, course: Course, physics: Physics) 
     list of numpy.ndarray
         Poses of the axle's centre [m, m, rad], shape (3,) each.
     """
-    order = np.random.default_rng(0).permutation(len(seen))  # bad starts are given up early
-    points, seen, bare = points[order], seen[order], float(physics["white"][0])
+    order = np.random.default_rng(0).permutation(len(read))  # bad starts are given up early
+    points, read, bare = points[order], read[order], float(physics["white"][0])
     x, y = (np.arange(0.5 * GRID_M, size, GRID_M) for size in (course.width_m, course.height_m))
     angles = np.linspace(0.0, math.tau, HEADINGS, endpoint=False)
     floor = _blurred(course, physics, GRID_M, COARSE_SPOT_M)
     best = np.empty((HEADINGS, 4))
-    _scan(floor, GRID_M, points, seen, bare, x, y, angles, best)
+    _scan(floor, GRID_M, points, read, bare, x, y, angles, best)
     home = np.array([course.start.x_m, course.start.y_m, course.start.heading_rad])
     places = [home, *_distinct(best, NEAR_M, NEAR_RAD)[:SCANNED]]
     floor = _blurred(course, physics, FINE_M, FINE_SPOT_M)
@@ -59,7 +59,7 @@ def likely_starts(points: Array, seen: Array, course: Course, physics: Physics) 
     for x0, y0, angle in places:
         best = np.empty((len(around), 4))
         own = x0 + FINE_M * around, y0 + FINE_M * around, angle + FINE_RAD * around
-        _scan(floor, FINE_M, points, seen, bare, *own, best)
+        _scan(floor, FINE_M, points, read, bare, *own, best)
         finer.append(best)
     return _distinct(np.concatenate(finer), SAME_M, SAME_RAD)[:RETURNED]
 
@@ -87,7 +87,7 @@ def _scan(
     floor: Array,
     pitch: float,
     points: Array,
-    seen: Array,
+    read: Array,
     bare: float,
     x: Array,
     y: Array,
@@ -112,7 +112,7 @@ def _scan(
                     level = bare
                     if 0 <= column < columns and 0 <= row < rows:
                         level = floor[row, column]
-                    z = (seen[k] - level) / READING_SD
+                    z = (read[k] - level) / READING_SD
                     cost += min(z * z, MOST_PER_SAMPLE)
                     if cost >= most:
                         break

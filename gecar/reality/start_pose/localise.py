@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from gecar.reality.optimisation.least_squares import KNEE, fit
-from gecar.reality.replay.reflectance import look_along
+from gecar.reality.optimisation.least_squares import KNEE, least_squares
+from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.start_pose.grid_search import FINE_SPOT_M, SAME_M, SAME_RAD, likely_starts, near
 from gecar.world.course import Course
 
@@ -24,26 +24,29 @@ Physics = npt.NDArray[Any]
 Stages = tuple[tuple[float, int], ...]
 
 ARC_M = 0.01  # what the sensor's path is sampled at
-# Spots a path is refined with [m], and how many of `rebegun`'s changes are free: the start, or wheels and track, too.
+# Spots a path is refined with [m], and how many changes of `with_other_wheels` are free: the start; wheels and track.
 SHARPER: Stages = ((FINE_SPOT_M, 3), (0.0, 3))
-REWHEELED: Stages = ((0.03, 6), (FINE_SPOT_M, 6), (0.0, 6))
-# Of a path, as `rebegun` takes them: what a fit calls one.
+WITH_WHEELS: Stages = ((0.03, 6), (FINE_SPOT_M, 6), (0.0, 6))
+# Scales of those changes in a fit.
 CHANGES = np.array([0.01, 0.01, 0.02, 0.01, 0.01, 0.05])
 PROBE, FARTHEST = 0.05, 5.0
-MISLED, FITS_PCT = 1.5, 3.0  # a misfit so many times smaller, and as small, with other wheels: they are other
+OTHER_WHEELS_GAIN, FITS_PCT = (
+    1.5,
+    3.0,
+)  # a misfit so many times smaller, and as small, with other wheels: they are other
 LEAST_CONTRAST = 5.0  # standard deviation of readings along the path [%]: less has not crossed a line
 KNEE_PCT = 5.0  # misfits this large and larger count less than their squares
 # Standard deviations of a start's pose that is told [m, m, rad].
 LEAST_KNOWN = np.array([0.004, 0.004, math.radians(1.0)])
 CORRELATED = 10.0  # readings that are wrong together: one crossing is one event
-CLEARLY = 1.5  # times the best fit's cost: a rival's
-SAME_PCT = 2.0  # what two places look the same by
+RIVAL_COST = 1.5  # times the best fit's cost: a rival's
+SAME_PCT = 2.0  # readings that differ by less do not tell two places apart
 # Over so long readings of even floor change by less, in percent and in their noise.
 EVEN_S, EVEN_PCT, EVEN_SD = 0.5, 4.0, 6.0
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class StartPose:
     """Where a recording began.
 
     Attributes
@@ -58,7 +61,7 @@ class Whereabouts:
     misfit: float
 
 
-def moved(path: Array, start: Array) -> Array:
+def starting_at(path: Array, start: Array) -> Array:
     """Return a path that begins at another pose, turned and carried there as a whole, shape (rows, 3)."""
     turn = start[2] - path[0, 2]
     cos, sin = math.cos(turn), math.sin(turn)
@@ -67,7 +70,7 @@ def moved(path: Array, start: Array) -> Array:
     return np.column_stack([there, path[:, 2] + turn])
 
 
-def rebegun(path: Array, change: Array) -> Array:
+def with_other_wheels(path: Array, change: Array) -> Array:
     """Return a path from another start and with other wheels, shape (rows, 3).
 
     Parameters
@@ -87,12 +90,10 @@ def rebegun(path: Array, change: Array) -> Array:
     length = (1.0 + ahead) * length
     x = path[0, 0] + np.r_[0.0, np.cumsum(length * np.cos(heading[:-1] + way))]
     y = path[0, 1] + np.r_[0.0, np.cumsum(length * np.sin(heading[:-1] + way))]
-    return moved(np.column_stack([x, y, heading]), path[0] + change[:3])
+    return starting_at(np.column_stack([x, y, heading]), path[0] + change[:3])
 
 
-def find_start(
-    t: Array, path: Array, readings: Array, course: Course, physics: Physics
-) -> Whereabouts | None:
+def find_start(t: Array, path: Array, readings: Array, course: Course, physics: Physics) -> StartPose | None:
     """Return where a recording began; None where its readings do not tell.
 
     Parameters
@@ -109,29 +110,31 @@ def find_start(
     points, seen = _sampled(path, readings, physics)
     if len(seen) < 10 or np.std(seen) < LEAST_CONTRAST:
         return None
-    look = _Look(t, readings, course, physics)
+    readings_misfit = _ReadingMisfit(t, readings, course, physics)
     starts = likely_starts(points, seen, course, physics)
-    found = sorted((look.refined(moved(path, start)) for start in starts), key=lambda one: one[1])
+    found = sorted(
+        (readings_misfit.refined(starting_at(path, start)) for start in starts), key=lambda one: one[1]
+    )
     best, least = found[0]
-    if (look.spread(best) > LEAST_KNOWN).any():
+    if (readings_misfit.spread(best) > LEAST_KNOWN).any():
         return None
-    twins = [other for other, misfit in found if misfit < CLEARLY * least]
-    for other in twins[1:]:
-        if not near(best[0], other[0], SAME_M, SAME_RAD) and look.differ(best, other) > SAME_PCT:
+    rivals = [other for other, misfit in found if misfit < RIVAL_COST * least]
+    for other in rivals[1:]:
+        if not near(best[0], other[0], SAME_M, SAME_RAD) and readings_misfit.differ(best, other) > SAME_PCT:
             return None
     home = np.array([course.start.x_m, course.start.y_m])
-    nearest = min(twins, key=lambda other: float(np.hypot(*(other[0, :2] - home))))
-    misfit = look.typical(nearest)
-    others = look.typical(look.refined(nearest, REWHEELED)[0])
-    if others < FITS_PCT and misfit > MISLED * others:
+    nearest = min(rivals, key=lambda other: float(np.hypot(*(other[0, :2] - home))))
+    misfit = readings_misfit.typical(nearest)
+    others = readings_misfit.typical(readings_misfit.refined(nearest, WITH_WHEELS)[0])
+    if others < FITS_PCT and misfit > OTHER_WHEELS_GAIN * others:
         return None
-    return Whereabouts(nearest[0], misfit)
+    return StartPose(nearest[0], misfit)
 
 
 def _sampled(path: Array, readings: Array, physics: Physics) -> tuple[Array, Array]:
     """Return where the sensor was seen from the start's pose, shape (n, 2) [m], and mean readings there, shape (n,)."""
     p = physics[0]
-    own = moved(path, np.zeros(3))
+    own = starting_at(path, np.zeros(3))
     cos, sin = np.cos(own[:, 2]), np.sin(own[:, 2])
     x = own[:, 0] + p["sensor_ahead"] * cos - p["sensor_left"] * sin
     y = own[:, 1] + p["sensor_ahead"] * sin + p["sensor_left"] * cos
@@ -156,7 +159,7 @@ def bare_floor(t: Array, readings: Array, sd: float) -> npt.NDArray[np.bool_]:
     return even & ~np.isnan(readings)
 
 
-class _Look:
+class _ReadingMisfit:
     """What a recording's sensor would have read along a path."""
 
     def __init__(self, t: Array, readings: Array, course: Course, physics: Physics) -> None:
@@ -168,7 +171,7 @@ class _Look:
         physics = self._physics.copy()
         physics["spot_diameter"] = math.hypot(physics["spot_diameter"][0], spot_m)
         out = np.empty(len(self._t))
-        look_along(self._t, path, 0.0, 1.0, self._raster, self._pitch, physics, np.zeros(3), out)
+        readings_along(self._t, path, 0.0, 1.0, self._raster, self._pitch, physics, np.zeros(3), out)
         return out
 
     def errors(self, path: Array, spot_m: float = 0.0) -> Array:
@@ -184,18 +187,18 @@ class _Look:
                 return np.r_[z, np.zeros(6 - free)] * CHANGES
 
             def misfit(z: Array, path: Array = path, spot: float = spot, change: Any = change) -> Array:
-                return self.errors(rebegun(path, change(z)), spot)
+                return self.errors(with_other_wheels(path, change(z)), spot)
 
             far = np.full(free, FARTHEST)
-            found = fit(misfit, np.zeros(free), (-far, far), np.full(free, PROBE))
-            path, cost = rebegun(path, change(found.z)), found.cost / self._there.sum()
+            found = least_squares(misfit, np.zeros(free), (-far, far), np.full(free, PROBE))
+            path, cost = with_other_wheels(path, change(found.z)), found.cost / self._there.sum()
         return path, cost
 
     def spread(self, path: Array) -> Array:
         """Return how uncertain a path's start is, shape (3,) [m, m, rad]; infinite along a line crossed once."""
         scale = 0.5 * LEAST_KNOWN
         sides = np.diag(scale)
-        ends = [(moved(path, path[0] + side), moved(path, path[0] - side)) for side in sides]
+        ends = [(starting_at(path, path[0] + side), starting_at(path, path[0] - side)) for side in sides]
         slopes = np.stack([(self.errors(one) - self.errors(other)) / 2.0 for one, other in ends])
         normal = slopes @ slopes.T
         noise = np.mean(self.errors(path) ** 2) + (KNEE / KNEE_PCT) ** 2

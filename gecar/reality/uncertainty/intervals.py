@@ -5,40 +5,35 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.gain_offset import level_spans
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.gain_offset import gain_intervals
 from gecar.reality.fitting.model import Model
 from gecar.reality.optimisation.least_squares import cost, weights
-from gecar.reality.selection.selection import Selection
-from gecar.reality.uncertainty.mcmc import wandered
+from gecar.reality.uncertainty.mcmc import walked_quantiles
 from gecar.reality.verdict import Interval
 
 Array = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.96
-SYSTEMATIC = 0.02  # of an effect's size: against the 3D engine, fitted parameters come back within so much
-SYSTEMATIC_STEP = 0.15  # of the smallest size worth a name
-# Gears that give add to their play: 0.3 to 0.8 degrees there.
-MORE_SYSTEMATIC = {"backlash": 0.12, "dead_band": 0.05}
-MORE_STEP = {"backlash": 0.6}
 FLAT = 2.0  # coordinates: a deviation so large comes from slopes that say nothing
-NOTICED = 12.0  # of cost: what walking along a flat parameter must not raise it by
+RISE = 12.0  # of cost: rise that ends a walk along a flat parameter
 
 
-def deviations(selection: Selection, model: Model) -> Array:
+def deviations(estimator: Estimator, model: Model) -> Array:
     """Return standard deviations of a model's coordinates, shape (k,).
 
     The larger of two: a sandwich over half-second spans, which holds whatever the noise's colour, and the jackknife
     over recordings, which also feels what no noise model knows.
     """
-    slopes, errors = selection.slopes(model), model.fit.errors
+    slopes, errors = estimator.own_sensitivities(model), model.errors
     w = weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
-    scores = np.stack([np.bincount(selection.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
+    scores = np.stack([np.bincount(estimator.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
     sandwich = inverse @ (scores.T @ scores) @ inverse
     leaps = []
-    for k in np.unique(selection.blocks.folds):
-        rows = selection.blocks.folds == k
+    for k in np.unique(estimator.blocks.folds):
+        rows = estimator.blocks.folds == k
         part = slopes[rows].T @ (w[rows, None] * slopes[rows])
         leaps.append(
             np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
@@ -49,24 +44,24 @@ def deviations(selection: Selection, model: Model) -> Array:
     return out
 
 
-def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interval]]:
+def intervals(estimator: Estimator, model: Model) -> dict[str, dict[str, Interval]]:
     """Return 95 % intervals of every parameter of a model, by effect and label."""
     if not model.effects:
         return {}
     out: dict[str, dict[str, Interval]] = {}
-    low, high = model.freedom.bounds
-    spans = level_spans(selection, model)
-    for k, (left, right) in wandered(selection, model).items():
-        spans[k] = (max(float(model.fit.z[k]) - left, 0.0), max(right - float(model.fit.z[k]), 0.0))
-    for k, (c, sd) in enumerate(zip(model.freedom.coordinates, deviations(selection, model), strict=True)):
-        z = float(model.fit.z[k])
-        step = MORE_STEP.get(c.parameter.field, SYSTEMATIC_STEP) if c.parameter.worthwhile > 0.0 else 0.0
-        size = MORE_SYSTEMATIC.get(c.parameter.field, SYSTEMATIC) * abs(z) + step
+    low, high = model.parameters.bounds
+    spans = gain_intervals(estimator, model)
+    for k, (left, right) in walked_quantiles(estimator, model).items():
+        spans[k] = (max(float(model.z[k]) - left, 0.0), max(right - float(model.z[k]), 0.0))
+    for k, (c, sd) in enumerate(zip(model.parameters.coordinates, deviations(estimator, model), strict=True)):
+        z = float(model.z[k])
+        step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
+        size = c.parameter.model_error * abs(z) + step
         if k in spans:
             down, up = spans[k]
         elif sd > FLAT:
             down, up = (
-                _walked(selection, model, k, side, abs(end - z))
+                _walked(estimator, model, k, side, abs(end - z))
                 for side, end in ((-1.0, low[k]), (1.0, high[k]))
             )
         else:
@@ -80,14 +75,14 @@ def intervals(selection: Selection, model: Model) -> dict[str, dict[str, Interva
     return out
 
 
-def _walked(selection: Selection, model: Model, k: int, side: float, most: float) -> float:
+def _walked(estimator: Estimator, model: Model, k: int, side: float, most: float) -> float:
     """Return how far one coordinate can go before the cost notices; the others stay."""
-    residual = selection.residual(model.freedom, model.shift)
+    residual = estimator.residual(model.parameters, model.tolerated)
     gone, pace = 0.0, 0.25
     while gone < most and pace < 64.0:
-        moved = model.fit.z.copy()
+        moved = model.z.copy()
         moved[k] += side * min(gone + pace, most)
-        if cost(residual(moved)) > model.cost + NOTICED:
+        if cost(residual(moved)) > model.cost + RISE:
             return gone + pace
         gone, pace = gone + pace, 1.5 * pace
     return most

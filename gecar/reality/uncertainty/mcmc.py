@@ -1,6 +1,6 @@
-"""Intervals where slopes tell nothing: how far a fit's coordinates wander together while the cost hardly notices.
+"""Intervals where derivatives tell nothing: a random walk over parameters that fit about as well (MCMC).
 
-A path that crosses a patch once has seen two points of its edge: many discs go through both, and no slope says so.
+A path that crosses a patch once has seen two points of its edge: many discs go through both, and no derivative says so.
 
 Source: adaptive Metropolis, Haario, Saksman, Tamminen, Bernoulli 7 (2001) 223-242, with its scale of 2.4 squared over
 the number of coordinates.
@@ -11,14 +11,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Model
 from gecar.reality.optimisation.least_squares import cost
-from gecar.reality.selection.cross_validation import SLOPELESS
-from gecar.reality.selection.selection import Selection
+from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
-STEPS, SETTLED, EVERY = (
+STEPS, BURN_IN, EVERY = (
     2400,
     400,
     100,
@@ -27,25 +27,25 @@ TOLERANCE = 4.0  # times as much cost as noise alone allows: noise lingers, and 
 BEGUN = 0.1  # coordinates: the first pace
 
 
-def wandered(selection: Selection, model: Model) -> dict[int, tuple[float, float]]:
-    """Return the 2.5 and 97.5 % quantiles of the coordinates of effects whose slopes tell nothing, by coordinate."""
-    own = [k for k, c in enumerate(model.freedom.coordinates) if c.effect.id in SLOPELESS]
+def walked_quantiles(estimator: Estimator, model: Model) -> dict[int, tuple[float, float]]:
+    """Return the 2.5 and 97.5 % quantiles of coordinates whose derivatives tell nothing, by coordinate."""
+    own = [k for k, c in enumerate(model.parameters.coordinates) if not BY_ID[c.effect.id].differentiable]
     if not own:
         return {}
-    walked = _walk(selection, model)[SETTLED:]
+    walked = _walk(estimator, model)[BURN_IN:]
     ends = np.quantile(walked, (0.025, 0.975), axis=0)
     return {k: (float(ends[0, k]), float(ends[1, k])) for k in own}
 
 
-def _walk(selection: Selection, model: Model) -> Array:
+def _walk(estimator: Estimator, model: Model) -> Array:
     """Return where a Metropolis walk went, shape (steps, coordinates)."""
     rng, residual = (
-        np.random.default_rng(len(model.fit.errors)),
-        selection.residual(model.freedom, model.shift),
+        np.random.default_rng(len(model.errors)),
+        estimator.residual(model.parameters, model.tolerated),
     )
-    low, high = model.freedom.bounds
-    count = len(model.fit.z)
-    z, here = model.fit.z.copy(), model.cost
+    low, high = model.parameters.bounds
+    count = len(model.z)
+    z, here = model.z.copy(), model.cost
     walked = np.empty((STEPS, count))
     root: Array = BEGUN * np.eye(count)
     for step in range(STEPS):

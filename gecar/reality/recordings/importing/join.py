@@ -9,10 +9,11 @@ import numpy.typing as npt
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import Series
+from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.recordings.importing.clock import ClockOffset, Likeness, compare, estimate_offset
 from gecar.reality.recordings.importing.frame import Frame, heading_offset, to_course
 from gecar.reality.recordings.importing.log import Log
-from gecar.reality.recordings.importing.track import Track, odometry
+from gecar.reality.recordings.importing.track import Track
 from gecar.reality.recordings.importing.units import UNITS
 from gecar.world.robot import Robot
 
@@ -88,7 +89,8 @@ def _brick_track(log: Log, robot: Robot) -> Track | None:
     left, right = log.columns["left_angle_deg"], log.columns["right_angle_deg"]
     seen = ~np.isnan(left) & ~np.isnan(right)
     radius, width = robot.body.wheel_radius, robot.body.track_width
-    return odometry(log.columns["t_s"][seen], np.deg2rad(left[seen]), np.deg2rad(right[seen]), radius, width)
+    path = wheel_odometry(np.deg2rad(left[seen]), np.deg2rad(right[seen]), radius, width)
+    return Track(log.columns["t_s"][seen], *path.T)
 
 
 def _align(joining: Joining, told: Track | None, seen: Track) -> float:

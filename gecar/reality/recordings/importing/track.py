@@ -1,4 +1,4 @@
-"""Paths in time, as the encoders tell them or a camera sees them, and what of a path needs no frame."""
+"""Paths in time, from encoders or a camera, and those of their features that need no common frame."""
 
 from __future__ import annotations
 
@@ -32,20 +32,6 @@ class Track:
         """Return some rows of the track."""
         heading = None if self.heading is None else self.heading[rows]
         return Track(self.t_s[rows], self.x[rows], self.y[rows], heading)
-
-
-def odometry(
-    t_s: Series, left_rad: Series, right_rad: Series, wheel_radius: float, track_width: float
-) -> Track:
-    """Return the path the encoders tell, from the origin along +x [s, m, rad]."""
-    steps = np.diff(np.column_stack([left_rad, right_rad]), axis=0) * wheel_radius
-    turns = (steps[:, 1] - steps[:, 0]) / track_width
-    heading = np.concatenate([[0.0], np.cumsum(turns)])
-    middle = heading[:-1] + turns / 2.0
-    moved = steps.mean(axis=1)
-    x = np.concatenate([[0.0], np.cumsum(moved * np.cos(middle))])
-    y = np.concatenate([[0.0], np.cumsum(moved * np.sin(middle))])
-    return Track(t_s, x, y, heading)
 
 
 def windows(track: Track, at: Series, window_s: float) -> list[Series]:

@@ -15,9 +15,15 @@ from gecar.reality.discovery import discover
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.replay.odometry import odometry
-from gecar.reality.replay.replayer import Film
-from gecar.reality.residuals.of_recording import Strip
-from gecar.reality.start_pose.localise import Whereabouts, bare_floor, find_start, moved, rebegun
+from gecar.reality.replay.replayer import replayer_of
+from gecar.reality.residuals.of_recording import residuals_of
+from gecar.reality.start_pose.localise import (
+    StartPose,
+    bare_floor,
+    find_start,
+    starting_at,
+    with_other_wheels,
+)
 from gecar.world.course import load_course
 from gecar.world.robot import Robot
 
@@ -27,10 +33,10 @@ SPINS = ARRIVES.replace("20,-80", "10,-70")
 
 
 def reckoned(recording: Recording) -> np.ndarray:
-    return odometry(Film(recording), EV3.physics)
+    return odometry(replayer_of(recording), EV3.physics)
 
 
-def whereabouts(recording: Recording, path: np.ndarray | None = None) -> Whereabouts | None:
+def whereabouts(recording: Recording, path: np.ndarray | None = None) -> StartPose | None:
     path = reckoned(recording) if path is None else path
     return find_start(recording.t_s, path, recording.reflection_pct, PAPER, EV3.physics)
 
@@ -45,7 +51,7 @@ def blind(robot: Robot, count: int = 4) -> Case:
 def test_dead_reckoning_keeps_the_path_of_a_robot_that_is_not_as_simulated() -> None:
     weak = EV3.with_effects({"coulomb_friction": {"torque_nm": 0.03}, "backlash": {"angle_deg": 3.0}})
     run = recorded(weak, 3)
-    path = moved(reckoned(run), np.array([1.0, 0.5, 0.3]))
+    path = starting_at(reckoned(run), np.array([1.0, 0.5, 0.3]))
     seen = ~np.isnan(run.x_m)
     assert np.hypot(path[seen, 0] - run.x_m[seen], path[seen, 1] - run.y_m[seen]).max() < 0.012
 
@@ -71,16 +77,16 @@ def test_a_start_nothing_tells_is_not_told() -> None:
 @pytest.mark.parametrize("wheels", [(0.0, 0.015, 0.0), (0.01, 0.0, 0.0), (0.0, 0.0, 0.05)])
 def test_dead_reckoning_with_wrong_wheels_is_seen_through(wheels: tuple[float, float, float]) -> None:
     run = trial("made", EV3, posed=False)
-    found = whereabouts(run, rebegun(reckoned(run), np.array([0.0, 0.0, 0.0, *wheels])))
+    found = whereabouts(run, with_other_wheels(reckoned(run), np.array([0.0, 0.0, 0.0, *wheels])))
     assert found is None or found.misfit < 4.0
 
 
 def test_other_wheels_stretch_a_path_and_a_new_start_carries_it() -> None:
     path = np.column_stack([np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)])
-    longer = rebegun(path, np.array([0.5, 0.0, 0.5 * math.pi, 0.1, 0.0, 0.0]))
+    longer = with_other_wheels(path, np.array([0.5, 0.0, 0.5 * math.pi, 0.1, 0.0, 0.0]))
     assert longer[0] == pytest.approx([0.5, 0.0, 0.5 * math.pi])
     assert longer[-1] == pytest.approx([0.5, 1.1, 0.5 * math.pi])
-    veering = rebegun(path, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
+    veering = with_other_wheels(path, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]))
     assert veering[-1, 2] == pytest.approx(0.2)
 
 
@@ -124,9 +130,8 @@ def path_heading(run: Recording) -> np.ndarray:
 
 def test_a_strip_no_camera_saw_looks_only_once_it_is_located() -> None:
     run = trial("made", EV3, posed=False)
-    strip = Strip(run, estimate_noise([run], EV3.physics, 1.0), 1.0, PAPER)
-    assert not strip.looks
-    strip.locate(EV3.physics)
-    strip.set_path(EV3.physics)
-    assert strip.looks
-    assert np.nanstd(strip.errors(EV3.physics, sight=True)) < 1.0
+    beside = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, PAPER)
+    assert not beside.reads
+    beside = beside.localised(EV3.physics).with_path(EV3.physics, np.ones(3))
+    assert beside.reads
+    assert np.nanstd(beside.sensor_errors(EV3.physics)) < 1.0
