@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import notes_on
@@ -22,7 +24,7 @@ from gecar.reality.locate.hotspot import hotspot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.prove.held_out import Confirmation, confirmed
 from gecar.reality.prove.holdout import judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.known_robot import known_robot
@@ -103,15 +105,22 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     split, tell = context.split, context.tell
     tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, context.robot.physics, MEMORY_S)
-    motion = _explain_motion(context, motion_residuals(split.fitted, noise, MEMORY_S, threads))
-    fitted = _along_paths(motion.problem.residuals, motion)
-    sensing = _explain_sensor(context, motion, fitted.of_sensor())
+    aside = motion_residuals(split.held, noise, MEMORY_S, threads)
+    moved = confirmed(
+        _explain_motion(context, motion_residuals(split.fitted, noise, MEMORY_S, threads)), aside
+    )
+    motion = moved.explained
+    fitted = _along_paths(motion.problem.residuals, motion, motion.taken.physics)
+    held = _along_paths(_on_their_clocks(aside, motion), motion, motion.taken.physics)
+    seen = _explain_sensor(context, motion, fitted.of_sensor(), held.of_sensor())
+    sensing = seen.explained if seen else None
     tell("intervals, alternatives, location")
     found = context.robot.with_effects({**motion.taken.values, **(sensing.taken.values if sensing else {})})
-    held = _held(motion_residuals(split.held, noise, MEMORY_S, threads), motion, found)
-    unexplained = motion.unexplained or bool(sensing and sensing.unexplained)
-    effects, rivals = _findings([each for each in (motion, sensing) if each], held, found)
+    if sensing and sensing.steps:
+        held = _along_paths(_on_their_clocks(aside, motion), motion, found.physics)
+    effects, rivals = _findings(context.robot, [each for each in (motion, sensing) if each])
     where = _located(context, motion, sensing, fitted, found)
+    unexplained = motion.unexplained or bool(sensing and sensing.unexplained)
     word = _word(bool(effects), unexplained)
     return Verdict(
         case=name,
@@ -125,7 +134,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
         robot=found.model_copy(update={"name": f"{context.robot.name}-{name}"}),
         fitted_on=tuple(r.name for r in split.fitted),
-        notes=notes_on(split, fitted, motion.problem.clocks_fitted, where.doubted),
+        notes=notes_on(
+            split,
+            fitted,
+            motion.problem.clocks_fitted,
+            where.doubted,
+            [step.effect for each in (moved, seen) if each for step in each.candidates],
+        ),
         evidence=Evidence(motion, sensing, where, fitted, held, context.robot),
     )
 
@@ -140,13 +155,20 @@ def _explain_motion(context: _Context, residuals: Residuals) -> Explanation:
     return replace(motion, unexplained=spot is not None, spot=spot)
 
 
-def _along_paths(residuals: Residuals, motion: Explanation) -> Residuals:
-    """Return recordings with the path their colour sensor took, as the model of the motion gives it."""
+def _on_their_clocks(held: Residuals, motion: Explanation) -> Residuals:
+    """Return the recordings set aside with their camera clocks fitted, if those of the others were."""
+    return with_fitted_clocks(held, motion.taken.physics)[0] if motion.problem.clocks_fitted else held
+
+
+def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
+    """Return recordings with the path their colour sensor took, as a model of the robot gives it."""
     inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
-    return residuals.localised(motion.taken.physics).with_paths(motion.taken.physics, inflation)
+    return residuals.localised(physics).with_paths(physics, inflation)
 
 
-def _explain_sensor(context: _Context, motion: Explanation, residuals: Residuals) -> Explanation | None:
+def _explain_sensor(
+    context: _Context, motion: Explanation, residuals: Residuals, held: Residuals
+) -> Confirmation | None:
     """Explain what the colour sensor read along the measured path; None where it read nothing."""
     if not residuals.recordings:
         return None
@@ -155,35 +177,29 @@ def _explain_sensor(context: _Context, motion: Explanation, residuals: Residuals
     limits = SENSOR_ON_A_DOUBTFUL_PATH if motion.unexplained else SENSOR
     catalogue = observable(context.catalogue, residuals)
     sensing = explain(problem_of(residuals, known, catalogue, limits, context.seed, context.tell))
-    return replace(sensing, taken=with_gain_from_even_floor(sensing.problem.estimator, sensing.taken))
-
-
-def _held(residuals: Residuals, motion: Explanation, found: Robot) -> Residuals:
-    """Return the recordings set aside, with the nuisances that those fitted on had, fitted anew."""
-    if motion.problem.clocks_fitted:
-        residuals = with_fitted_clocks(residuals, found.physics)[0]
-    inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
-    return residuals.localised(found.physics).with_paths(found.physics, inflation)
+    seen = confirmed(sensing, held)
+    taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
+    return replace(seen, explained=replace(seen.explained, taken=taken))
 
 
 def _findings(
-    explanations: Sequence[Explanation], held: Residuals, robot: Robot
+    known: Robot, explanations: Sequence[Explanation]
 ) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
     """Return what was found, and robots with an alternative in its place."""
     found, rivals = list[Found](), list[Robot]()
     for explained in explanations:
-        if not explained.steps:
-            continue
         spans = intervals(explained.problem.estimator, explained.taken)
-        beside = held.of_sensor() if explained.problem.residuals.sensor else held
-        with_all = cost(beside.errors(robot.physics)) if beside.recordings else 0.0
+        others_found = {
+            effect: values
+            for other in explanations
+            if other is not explained
+            for effect, values in other.taken.values.items()
+        }
         for step in explained.steps:
-            rest = {k: v for k, v in robot.effects.items() if k != step.effect}
-            without = robot.model_copy(update={"effects": rest})
-            gain = cost(beside.errors(without.physics)) - with_all if beside.recordings else float("nan")
             others = alternatives(explained, step)
-            rivals += [without.with_effects(model.values) for model in others.values()]
-            found.append(Found(step.effect, tuple(others), spans[step.effect], gain, step.null_95, step.p))
+            rivals += [known.with_effects({**others_found, **model.values}) for model in others.values()]
+            gain, null = step.holdout_gain, step.null_95
+            found.append(Found(step.effect, tuple(others), spans[step.effect], gain, null, step.p))
     return tuple(found), tuple(rivals)
 
 

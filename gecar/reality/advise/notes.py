@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gecar.reality.recordings.split import Split
@@ -9,7 +11,9 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 
 
-def notes_on(split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool) -> tuple[str, ...]:
+def notes_on(
+    split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool, candidates: Sequence[str] = ()
+) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
     Parameters
@@ -22,8 +26,13 @@ def notes_on(split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool
         Whether each camera's clock offset was fitted.
     doubted
         Whether a misfit of readings points to the measured path, rather than to the sensor.
+    candidates
+        Effects that proved themselves where they were fitted, and gain nothing on the recordings set aside.
     """
-    notes = []
+    notes = [
+        f"{effect} explains recordings it was fitted to, and gains nothing on those set aside: a candidate, no finding."
+        for effect in candidates
+    ]
     if split.by_time:
         notes.append(
             "Only one recording: its last part was set aside, so it is judged on later times, not on another run."

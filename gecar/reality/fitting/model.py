@@ -88,6 +88,10 @@ class Step:
         Whether its size is worth a name.
     energy_before, energy_after
         Excess energy without and with it, by the same measure.
+    stage
+        At which stage of a chain it was tried, from 0.
+    holdout_gain
+        What it lowers the cost of the recordings set aside by, beside the others refitted without it.
     """
 
     effect: str
@@ -100,6 +104,8 @@ class Step:
     worthwhile: bool = False
     energy_before: float = 0.0
     energy_after: float = 0.0
+    stage: int = 0
+    holdout_gain: float = np.nan
 
     @property
     def drop(self) -> float:

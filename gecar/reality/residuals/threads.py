@@ -33,7 +33,7 @@ class Threads:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._pool is not None
-        self._pool.shutdown()
+        self._pool.shutdown(cancel_futures=True)
         self._pool = None
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

@@ -14,9 +14,8 @@ from gecar.reality.selection.thresholds import CERTAIN, CLOSE
 def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
     """Return the effects that could stand in an effect's place: models by effect."""
     taken, estimator = explained.taken, explained.problem.estimator
-    number = [s.effect for s in explained.steps].index(step.effect)
     out = {}
-    for other in explained.tried[number]:
+    for other in explained.tried[step.stage]:
         if other.effect in taken.effects or other.gain < (1.0 - 2.0 * CLOSE) * step.gain:
             continue
         rest = [e for e in taken.effects if e != step.effect]

@@ -79,13 +79,13 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     named = [t.gain for t in begun if worthwhile(t.parameters, t.minimum.z, t.effect)]
     best = max(named, default=max(t.gain for t in begun))
     steps = [
-        _step(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
+        step_of(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
         for t in begun[: int(REFITTED)]
         if t.gain >= NEGLIGIBLE * best
     ]
     steps.sort(key=lambda s: -s.gain)
     if steps and steps[0].model.excess_energy > DOUBTFUL_FIT * problem.blocks:
-        steps[0] = _step(
+        steps[0] = step_of(
             estimator, steps[0].effect, steps[0].base, _searched_about(estimator, steps[0].model)
         )
     return steps
@@ -171,7 +171,8 @@ def _searched_about(estimator: Estimator, model: Model) -> Model:
     return found if found.cost < again.cost else again
 
 
-def _step(estimator: Estimator, effect: str, base: Model, found: Model) -> Step:
+def step_of(estimator: Estimator, effect: str, base: Model, found: Model) -> Step:
+    """Return the step from a model to one with an effect more."""
     inflation = estimator.blocks.inflation(found.errors)
     before, after = (estimator.blocks.excess_energy(m.errors, inflation) for m in (base, found))
     size = is_worthwhile(found, effect)

@@ -13,7 +13,7 @@ from gecar.reality.selection.acceptance import candidates, is_worthwhile, number
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.model_tolerance import without_tolerated
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
-from gecar.reality.selection.screening import candidate_steps
+from gecar.reality.selection.screening import candidate_steps, step_of
 from gecar.reality.selection.thresholds import (
     BEGINNINGS,
     CLOCKS_FIRST,
@@ -76,8 +76,13 @@ def explain(problem: Problem) -> Explanation:
     tried = (tuple(first), *best.tried[1:])
     taken, steps = _swapped_and_dropped(problem, best.steps, tried)
     left = without_tolerated(problem, taken)
+    return Explanation(problem, taken, left, steps, tried, is_unexplained(problem, left))
+
+
+def is_unexplained(problem: Problem, left: Model) -> bool:
+    """Whether a model leaves more excess energy than the simulation itself does."""
     floor = max(problem.limits.unexplained * problem.blocks, UNEXPLAINED_SHARE * problem.known.excess_energy)
-    return Explanation(problem, taken, left, steps, tried, left.excess_energy > floor)
+    return left.excess_energy > floor
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
         if step is None:
             break
         problem.tell(f"{step.effect}: explains {step.drop / step.energy_before:.0%} of what is left")
-        steps.append(step)
+        steps.append(replace(step, stage=len(steps)))
         model = step.model
         if len(steps) == most or not _worth_fitting(problem, model):
             break
@@ -167,9 +172,9 @@ def _swapped_and_dropped(
     rivals = {step.effect: step for stage in tried for step in stage[: int(RUNNERS_UP)]}
     for number, step in enumerate(accepted if len(accepted) > 1 else ()):
         rest = [e for e in best.effects if e != step.effect]
-        swapped = _swapped(problem, best, rest, list(rivals.values()), best.cost - null)
-        if swapped is not None:
-            best, steps[number] = swapped, replace(step, effect=swapped.effects[-1])
+        swap = _swapped(problem, best, rest, list(rivals.values()), best.cost - null)
+        if swap is not None:
+            best, steps[number] = swap.model, replace(swap, stage=step.stage)
             continue
         without = estimator.fit(rest, best.values, tolerated=best.tolerated)
         if without.cost < best.cost + null or without.excess_energy < floor:
@@ -182,15 +187,19 @@ def _swapped_and_dropped(
 
 def _swapped(
     problem: Problem, best: Model, rest: Sequence[str], rivals: Sequence[Step], least: float
-) -> Model | None:
-    """Return the model with the first rival in an effect's place that costs less than ``least``; None: none does."""
+) -> Step | None:
+    """Return the step to the first rival in an effect's place that costs less than ``least`` and proves itself."""
+    estimator = problem.estimator
     for other in rivals:
         if other.effect in best.effects:
             continue
         values = {**best.values, **other.model.values}
-        swapped = problem.estimator.fit((*rest, other.effect), values, tolerated=best.tolerated)
+        swapped = estimator.fit((*rest, other.effect), values, tolerated=best.tolerated)
         if swapped.cost < least and is_worthwhile(swapped, other.effect):
-            return swapped
+            without = estimator.fit(rest, best.values, tolerated=best.tolerated)
+            step = judged(problem, step_of(estimator, other.effect, without, swapped))
+            if proved(step):
+                return step
     return None
 
 
