@@ -22,6 +22,15 @@ TRUST = 0.0005
 # A path's errors linger while the sensor crosses an edge: many samples, one event.
 PATH_CAUTION = 2.0
 
+# Fields of a recording that share one standard deviation.
+_FIELDS = (
+    ("left_angle_rad", "right_angle_rad"),
+    ("battery_v",),
+    ("yaw_rate_rad_s",),
+    ("x_m", "y_m"),
+    ("heading_rad",),
+)
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -71,11 +80,11 @@ def estimate_noise(recordings: Sequence[Recording], physics: npt.NDArray[Any], m
         paces.append(rows[:, 9])
         turns.append(rows[:, 3])
     sd = np.array([_spread(parts, usual) for parts, usual in zip(left, USUAL_NOISE, strict=True)])
-    quantum = _quantum(recordings)
+    rounding = _rounding(recordings)
     motion = _rms(speeds) * memory_s * TRUST
-    sd[0] = np.sqrt(max(sd[0], quantum / np.sqrt(12.0)) ** 2 + motion**2)
+    sd[0] = np.sqrt(max(sd[0], rounding[0]) ** 2 + motion**2)
     walk = np.array([2.0 * TRUST * _rms(paces) + 1e-4, TRUST * _rms(turns) + 2e-4])
-    sd = _stated(recordings, sd)
+    sd = np.maximum(_stated(recordings, sd), rounding)
     frames = max(_frames_per_smoothing(replayers), 1.0)
     path_sd = PATH_CAUTION * np.array([sd[3], sd[3], sd[4]]) / np.sqrt(frames)
     return Noise(sd, walk, _reflection_sd(recordings), path_sd)
@@ -99,15 +108,21 @@ def _rms(parts: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _quantum(recordings: Sequence[Recording]) -> float:
-    """Return the smallest change an encoder reports [rad]."""
+def _rounding(recordings: Sequence[Recording]) -> Array:
+    """Return the standard deviations that rounding alone leaves, shape (5,): a quantum over the root of 12.
+
+    A quantum is the smallest change a channel reports, single outliers aside.
+    """
+    return np.array([_quantum(recordings, fields) for fields in _FIELDS]) / np.sqrt(12.0)
+
+
+def _quantum(recordings: Sequence[Recording], fields: Sequence[str]) -> float:
     steps = []
-    for r in recordings:
-        for angles in (r.left_angle_rad, r.right_angle_rad):
-            change = np.abs(np.diff(angles[~np.isnan(angles)]))
-            change = change[change > 1e-9]
-            if len(change):
-                steps.append(np.quantile(change, 0.02))
+    for values in (getattr(r, field) for r in recordings for field in fields):
+        change = np.abs(np.diff(values[~np.isnan(values)]))
+        change = change[change > 1e-9]
+        if len(change):
+            steps.append(np.quantile(change, 0.02))
     return float(min(steps)) if steps else 0.0
 
 
@@ -134,15 +149,8 @@ def _frames_per_smoothing(replayers: Sequence[Replayer]) -> float:
 
 def _stated(recordings: Sequence[Recording], sd: Array) -> Array:
     """Take what the files state about their noise, where they do."""
-    fields = (
-        ("left_angle_rad", "right_angle_rad"),
-        ("battery_v",),
-        ("yaw_rate_rad_s",),
-        ("x_m", "y_m"),
-        ("heading_rad",),
-    )
     out = sd.copy()
-    for k, names in enumerate(fields):
+    for k, names in enumerate(_FIELDS):
         said = [r.setup.noise[n] for r in recordings for n in names if r.setup.noise.get(n, 0.0) > 0.0]
         if said:
             out[k] = max(float(np.median(said)), out[k]) if k == 0 else float(np.median(said))
