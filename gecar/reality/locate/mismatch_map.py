@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
 from gecar.reality.locate.regimes import regime_masks
+from gecar.reality.locate.shift_test import DRAWS, best_disc, regime_p
 from gecar.reality.replay.channels import CHANNELS, REFLECTION, ResidualIndex
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.selection.thresholds import SIGNIFICANCE
@@ -22,12 +23,10 @@ Physics = npt.NDArray[Any]
 ON_THE_FLOOR = "place on the floor"
 BIN_S = 0.1
 SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happened there is felt
-SHIFTS = 499
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
 FAINT = 0.02  # of the loudest channel's energy, of motion or of sight: less is not worth an entry
-PLACE_RADII_M = (0.1, 0.2, 0.3)
 SPAN_BINS = 2  # bins a span is made of
 LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
 GROUPS = (
@@ -70,6 +69,8 @@ class MismatchMap:
     loud
         What a mismatch adds up to over a stretch (see `gecar.reality.locate.misfit_energy`), in variances of noise,
         shape (groups of channels, recordings, spans).
+    lengths
+        How many bins each recording has, shape (recordings,).
     masks
         Regimes by name, each of shape (recordings, bins).
     """
@@ -88,6 +89,7 @@ class MismatchMap:
     ) -> None:
         self.runs = tuple(runs)
         self.bins = SPAN_BINS * max(int(s.replayer.t[-1] / (SPAN_BINS * BIN_S)) + 1 for s in runs)
+        self.lengths = np.array([int(run.replayer.t[-1] / BIN_S) + 1 for run in self.runs])
         shape = (len(CHANNELS), len(runs), self.bins)
         total, count = np.zeros(shape), np.zeros(shape)
         at = (index.channel, index.recording, np.minimum((index.t_s / BIN_S).astype(int), self.bins - 1))
@@ -127,8 +129,8 @@ class MismatchMap:
         found = []
         most = np.where(np.arange(len(CHANNELS)) < REFLECTION, excess[:REFLECTION].max(), excess[REFLECTION])
         for channel in np.flatnonzero((mean > WORTH) & (excess > FAINT * most)):
-            entries = [self._judge(int(channel), name, mask, rng) for name, mask in self.masks.items()]
-            entries.append(self._spot(int(channel), rng))
+            entries = [self._regime(int(channel), name, mask, rng) for name, mask in self.masks.items()]
+            entries.append(self._place(int(channel), rng))
             group = order.index(_GROUP[channel])
             found += [(group, excess[channel] * telling, place) for telling, place in filter(None, entries)]
         if order and not any(group == 0 for group, _, _ in found):
@@ -152,34 +154,35 @@ class MismatchMap:
         there = [k for k, group in enumerate(GROUPS) if self.samples[group].any()]
         return sorted(there, key=lambda k: -loud[k])
 
-    def _judge(
-        self, channel: int, name: str, mask: npt.NDArray[np.bool_], rng: np.random.Generator,
-        spot: tuple[float, float, float] | None = None,
-    ) -> tuple[float, Place] | None:  # fmt: skip
+    def _regime(
+        self, channel: int, name: str, mask: npt.NDArray[np.bool_], rng: np.random.Generator
+    ) -> tuple[float, Place] | None:
         """Return how telling a regime is, and its entry; None where chance would do as well."""
-        energy = self.energy[channel]
-        whole = energy.sum()
-        there = mask & (self.samples[channel] > 0)
-        covered = there.sum() / max((self.samples[channel] > 0).sum(), 1)
+        whole = self.energy[channel].sum()
+        covered = self._covered(channel, mask)
         if whole <= 0.0 or not 0.01 < covered < 0.9:
             return None
-        inside = float(energy[mask].sum())
-        share = inside / whole
-        drawn = _shifted(energy, mask, rng)
-        p = float((1 + np.sum(drawn >= inside)) / (1 + SHIFTS))
+        p = regime_p(self.energy[channel], mask, self.lengths, rng)
+        return self._entry(channel, name, mask, p)
+
+    def _covered(self, channel: int, mask: npt.NDArray[np.bool_]) -> float:
+        """Return the share of a channel's bins that lie in a regime."""
+        there = self.samples[channel] > 0
+        return float((mask & there).sum() / max(there.sum(), 1))
+
+    def _entry(
+        self, channel: int, name: str, mask: npt.NDArray[np.bool_], p: float,
+        place: tuple[float, float, float] | None = None,
+    ) -> tuple[float, Place] | None:  # fmt: skip
+        """Return how telling a regime or place is, and its entry; None where it is not significant."""
+        covered = self._covered(channel, mask)
+        share = float(self.energy[channel][mask].sum() / self.energy[channel].sum())
         if p > SIGNIFICANCE or share <= covered:
             return None
         loud, spans = self._spans(channel)
-        place = Place(
-            CHANNELS[channel],
-            name,
-            round(float(min(share, 1.0)), 3),
-            p,
-            spans,
-            self.runs[loud].recording.name,
-            spot,
-        )
-        return float((share - covered) * np.sqrt(share)), place
+        name_of = self.runs[loud].recording.name
+        entry = Place(CHANNELS[channel], name, round(min(share, 1.0), 3), p, spans, name_of, place)
+        return float((share - covered) * np.sqrt(share)), entry
 
     def _spans(self, channel: int) -> tuple[int, tuple[tuple[float, float], ...]]:
         """Return the recording in which a channel's sensor is loudest, and its loudest spans there."""
@@ -197,46 +200,21 @@ class MismatchMap:
     def _throughout(self, channel: int) -> Place:
         """Return the entry of a channel that is off whatever the motion: the last resort."""
         count = self.samples[channel].sum()
-        p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + SHIFTS))
+        p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + DRAWS))
         loud, spans = self._spans(channel)
         name = self.runs[loud].recording.name
         if self.spot is None:
             return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
         return Place(CHANNELS[channel], ON_THE_FLOOR, 1.0, round(p, 3), spans, name, (*self.spot, SPOT_M))
 
-    def _spot(self, channel: int, rng: np.random.Generator) -> tuple[float, Place] | None:
-        """Return the disc on the floor that holds most energy beyond its share of the time."""
-        seen = ~np.isnan(self.path[:, :, 0]) & (self.samples[channel] > 0)
-        energy = self.energy[channel]
-        whole = energy[seen].sum()
-        if seen.sum() < 50 or whole <= 0.0:
+    def _place(self, channel: int, rng: np.random.Generator) -> tuple[float, Place] | None:
+        """Return how telling the best place on the floor is, and its entry."""
+        path = np.where((self.samples[channel] > 0)[:, :, None], self.path, np.nan)
+        disc = best_disc(self.energy[channel], path, self.lengths, rng)
+        if disc is None:
             return None
-        best: tuple[float, tuple[float, float, float]] | None = None
-        for x, y in np.unique(np.round(self.path[seen] / 0.1).astype(int), axis=0) * 0.1:
-            distance = np.hypot(self.path[:, :, 0] - x, self.path[:, :, 1] - y)
-            for radius in PLACE_RADII_M:
-                inside = seen & (distance < radius)
-                gain = energy[inside].sum() / whole - 1.5 * inside.sum() / seen.sum()
-                if best is None or gain > best[0]:
-                    best = (float(gain), (round(float(x), 2), round(float(y), 2), radius))
-        if best is None or best[0] < 0.3:
-            return None
-        x, y, radius = best[1]
-        mask = seen & (np.hypot(self.path[:, :, 0] - x, self.path[:, :, 1] - y) < radius)
-        return self._judge(channel, ON_THE_FLOOR, mask, rng, best[1])
-
-
-def _shifted(energy: Array, mask: npt.NDArray[np.bool_], rng: np.random.Generator) -> Array:
-    """Return the energy inside a mask that is shifted in time, in each recording by another random length.
-
-    Blocks stay together, so that what lingers is no surprise; all shifts of a recording at once are a correlation.
-    """
-    bins = energy.shape[1]
-    spectrum = np.fft.rfft(energy, axis=1) * np.conj(np.fft.rfft(mask.astype(float), axis=1))
-    inside = np.fft.irfft(spectrum, bins, axis=1)
-    shifts = rng.integers(0, bins, (SHIFTS, len(energy)))
-    drawn: Array = inside[np.arange(len(energy)), shifts].sum(axis=1)
-    return drawn
+        place = (disc.x_m, disc.y_m, disc.radius_m)
+        return self._entry(channel, ON_THE_FLOOR, disc.inside, disc.p, place)
 
 
 def _around(path: Array, spot: tuple[float, float]) -> npt.NDArray[np.bool_]:
