@@ -6,7 +6,7 @@ print(verdict)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +24,7 @@ from gecar.reality.locate.hotspot import hotspot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.prove.held_out import Confirmation, confirmed
+from gecar.reality.prove.held_out import Confirmation, confirmed, dropped
 from gecar.reality.prove.holdout import judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.known_robot import known_robot
@@ -38,8 +38,8 @@ from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import problem_of
 from gecar.reality.selection.stepwise import Explanation, explain
 from gecar.reality.selection.thresholds import MOTION, SENSOR, SENSOR_ON_A_DOUBTFUL_PATH
-from gecar.reality.uncertainty.intervals import intervals
-from gecar.reality.verdict import Found, Judgement, Misfit, Residual, Verdict
+from gecar.reality.uncertainty.intervals import contains_neutral, intervals
+from gecar.reality.verdict import Found, Interval, Judgement, Misfit, Residual, Verdict
 from gecar.world.effects import CATALOGUE, Effect
 from gecar.world.robot import Robot
 
@@ -106,19 +106,18 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, context.robot.physics, MEMORY_S)
     aside = motion_residuals(split.held, noise, MEMORY_S, threads)
-    moved = confirmed(
-        _explain_motion(context, motion_residuals(split.fitted, noise, MEMORY_S, threads)), aside
-    )
+    residuals = motion_residuals(split.fitted, noise, MEMORY_S, threads)
+    moved = _sized(context, confirmed(_explain_motion(context, residuals), aside))
     motion = moved.explained
     fitted = _along_paths(motion.problem.residuals, motion, motion.taken.physics)
     held = _along_paths(_on_their_clocks(aside, motion), motion, motion.taken.physics)
     seen = _explain_sensor(context, motion, fitted.of_sensor(), held.of_sensor())
     sensing = seen.explained if seen else None
-    tell("intervals, alternatives, location")
+    tell("alternatives, location")
     found = context.robot.with_effects({**motion.taken.values, **(sensing.taken.values if sensing else {})})
     if sensing and sensing.steps:
         held = _along_paths(_on_their_clocks(aside, motion), motion, found.physics)
-    effects, rivals = _findings(context.robot, [each for each in (motion, sensing) if each])
+    effects, rivals = _findings(context.robot, [each for each in (moved, seen) if each])
     where = _located(context, motion, sensing, fitted, found)
     unexplained = motion.unexplained or bool(sensing and sensing.unexplained)
     word = _word(bool(effects), unexplained)
@@ -168,7 +167,7 @@ def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray
 
 def _explain_sensor(
     context: _Context, motion: Explanation, residuals: Residuals, held: Residuals
-) -> Confirmation | None:
+) -> _Sized | None:
     """Explain what the colour sensor read along the measured path; None where it read nothing."""
     if not residuals.recordings:
         return None
@@ -179,27 +178,44 @@ def _explain_sensor(
     sensing = explain(problem_of(residuals, known, catalogue, limits, context.seed, context.tell))
     seen = confirmed(sensing, held)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
-    return replace(seen, explained=replace(seen.explained, taken=taken))
+    return _sized(context, replace(seen, explained=replace(seen.explained, taken=taken)))
 
 
-def _findings(
-    known: Robot, explanations: Sequence[Explanation]
-) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
+@dataclass(frozen=True)
+class _Sized(Confirmation):
+    """What was confirmed, with the 95 % intervals of its parameters by effect and label."""
+
+    spans: Mapping[str, Mapping[str, Interval]]
+
+
+def _sized(context: _Context, confirmation: Confirmation) -> _Sized:
+    """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate."""
+    explained, candidates = confirmation.explained, confirmation.candidates
+    context.tell("intervals")
+    while True:
+        spans = intervals(explained.problem.estimator, explained.taken, context.seed)
+        absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
+        if not absent:
+            return _Sized(explained, candidates, spans)
+        weakest = min(absent, key=lambda step: step.gain)
+        explained, candidates = dropped(explained, weakest), (*candidates, weakest)
+
+
+def _findings(known: Robot, explanations: Sequence[_Sized]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
     """Return what was found, and robots with an alternative in its place."""
     found, rivals = list[Found](), list[Robot]()
-    for explained in explanations:
-        spans = intervals(explained.problem.estimator, explained.taken)
-        others_found = {
+    for sized in explanations:
+        beside = {
             effect: values
             for other in explanations
-            if other is not explained
-            for effect, values in other.taken.values.items()
+            if other is not sized
+            for effect, values in other.explained.taken.values.items()
         }
-        for step in explained.steps:
-            others = alternatives(explained, step)
-            rivals += [known.with_effects({**others_found, **model.values}) for model in others.values()]
+        for step in sized.explained.steps:
+            others = alternatives(sized.explained, step)
+            rivals += [known.with_effects({**beside, **model.values}) for model in others.values()]
             gain, null = step.holdout_gain, step.null_95
-            found.append(Found(step.effect, tuple(others), spans[step.effect], gain, null, step.p))
+            found.append(Found(step.effect, tuple(others), sized.spans[step.effect], gain, null, step.p))
     return tuple(found), tuple(rivals)
 
 

@@ -255,7 +255,8 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("patch_radius", "radius_m", "m", 0.0, 0.6, 0.0, 0.05, search_spread=1.5),
             _P("patch_x", "x_m", "m", -5.0, 5.0, 0.0, 0.0, shape_step=0.03, search_spread=2.0),
             _P("patch_y", "y_m", "m", -5.0, 5.0, 0.0, 0.0, shape_step=0.03, search_spread=2.0),
-            _P("patch_friction", "coefficient", "-", 0.01, 0.6, 0.1, 0.0, by_ratio=True, search_spread=0.5)),
+            _P("patch_friction", "coefficient", "-", 0.01, 0.6, 0.1, 0.0, by_ratio=True, search_spread=0.5,
+               model_error=0.05)),
            ("pose",), "a place on the map", _TYRE,
            needs=("floor", "pose"), scan="floor cells", differentiable=False,
            # the edge makes many valleys close together: with fewer finalists three seeds ended in three places

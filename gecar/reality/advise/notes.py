@@ -27,10 +27,11 @@ def notes_on(
     doubted
         Whether a misfit of readings points to the measured path, rather than to the sensor.
     candidates
-        Effects that proved themselves where they were fitted, and gain nothing on the recordings set aside.
+        Effects that proved themselves where they were fitted, and were not confirmed.
     """
     notes = [
-        f"{effect} explains recordings it was fitted to, and gains nothing on those set aside: a candidate, no finding."
+        f"{effect} explains recordings it was fitted to, but gains nothing on those set aside, or its interval holds "
+        "its neutral value: a candidate, no finding."
         for effect in candidates
     ]
     if split.by_time:

@@ -2,35 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import t as student
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
 from gecar.reality.fitting.model import Model
-from gecar.reality.optimisation.least_squares import cost, weights
-from gecar.reality.uncertainty.mcmc import walked_quantiles
+from gecar.reality.fitting.profile import RISE_95, reaches
+from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
 
 Array = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.96
-FLAT = 2.0  # coordinates: a deviation so large comes from slopes that say nothing
-RISE = 12.0  # of cost: rise that ends a walk along a flat parameter
+FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
+FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
 
 
 def deviations(estimator: Estimator, model: Model) -> Array:
-    """Return standard deviations of a model's coordinates, shape (k,).
+    """Return standard deviations of a model's coordinates, shape (k,)."""
+    return half_widths(estimator, model) / NORMAL_95
 
-    The larger of two: a sandwich over half-second spans, which holds whatever the noise's colour, and the jackknife
-    over recordings, which also feels what no noise model knows.
+
+def half_widths(estimator: Estimator, model: Model) -> Array:
+    """Return half the 95 % intervals of a model's coordinates, shape (k,).
+
+    The larger of two: a sandwich over half-second spans, which holds whatever the noise's correlation, and the
+    jackknife over recordings with Student's t, which also holds what no noise model knows.
+
+    Sources: White, Econometrica 48 (1980) 817; Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
     """
     slopes, errors = estimator.own_sensitivities(model), model.errors
     w = weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
     scores = np.stack([np.bincount(estimator.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
-    sandwich = inverse @ (scores.T @ scores) @ inverse
+    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse)
     leaps = []
     for k in np.unique(estimator.blocks.folds):
         rows = estimator.blocks.folds == k
@@ -39,33 +50,45 @@ def deviations(estimator: Estimator, model: Model) -> Array:
             np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
         )
     folds = len(leaps)
+    if folds < 2:
+        return NORMAL_95 * np.sqrt(sandwich)
     jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    out: Array = np.sqrt(np.maximum(np.diag(sandwich), jack))
-    return out
+    return np.maximum(NORMAL_95 * np.sqrt(sandwich), student.ppf(0.975, folds - 1) * np.sqrt(jack))
 
 
-def intervals(estimator: Estimator, model: Model) -> dict[str, dict[str, Interval]]:
+def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
+    """Whether no size of an effect has an interval that leaves its neutral value out."""
+    sizes = [
+        (spans[effect][c.parameter.label], c.value(0.0))
+        for c in model.parameters.coordinates
+        if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
+    ]
+    return all(interval.low <= neutral <= interval.high for interval, neutral in sizes)
+
+
+def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
     """Return 95 % intervals of every parameter of a model, by effect and label."""
     if not model.effects:
         return {}
     out: dict[str, dict[str, Interval]] = {}
     low, high = model.parameters.bounds
     spans = gain_intervals(estimator, model)
-    for k, (left, right) in walked_quantiles(estimator, model).items():
+    for k, (left, right) in walked_quantiles(estimator, model, seed).items():
         spans[k] = (max(float(model.z[k]) - left, 0.0), max(right - float(model.z[k]), 0.0))
-    for k, (c, sd) in enumerate(zip(model.parameters.coordinates, deviations(estimator, model), strict=True)):
+    everything, residual = np.arange(len(model.z)), estimator.residual(model.parameters, model.tolerated)
+    for k, (c, half) in enumerate(
+        zip(model.parameters.coordinates, half_widths(estimator, model), strict=True)
+    ):
         z = float(model.z[k])
         step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
-        size = c.parameter.model_error * abs(z) + step
+        # A parameter that acts by its ratio has its logarithm for a coordinate: a share of it is a difference there.
+        size = c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step
         if k in spans:
             down, up = spans[k]
-        elif sd > FLAT:
-            down, up = (
-                _walked(estimator, model, k, side, abs(end - z))
-                for side, end in ((-1.0, low[k]), (1.0, high[k]))
-            )
+        elif half > NORMAL_95 * FLAT:
+            down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
         else:
-            down = up = NORMAL_95 * sd
+            down = up = float(half)
         reach = NORMAL_95 * 0.5 * size
         edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
         ends = sorted(c.value(float(end)) for end in edges)
@@ -73,16 +96,3 @@ def intervals(estimator: Estimator, model: Model) -> dict[str, dict[str, Interva
             c.value(z), ends[0], ends[1], c.parameter.unit
         )
     return out
-
-
-def _walked(estimator: Estimator, model: Model, k: int, side: float, most: float) -> float:
-    """Return how far one coordinate can go before the cost notices; the others stay."""
-    residual = estimator.residual(model.parameters, model.tolerated)
-    gone, pace = 0.0, 0.25
-    while gone < most and pace < 64.0:
-        moved = model.z.copy()
-        moved[k] += side * min(gone + pace, most)
-        if cost(residual(moved)) > model.cost + RISE:
-            return gone + pace
-        gone, pace = gone + pace, 1.5 * pace
-    return most

@@ -27,20 +27,20 @@ TOLERANCE = 4.0  # times as much cost as noise alone allows: noise lingers, and 
 BEGUN = 0.1  # coordinates: the first pace
 
 
-def walked_quantiles(estimator: Estimator, model: Model) -> dict[int, tuple[float, float]]:
+def walked_quantiles(estimator: Estimator, model: Model, seed: int = 0) -> dict[int, tuple[float, float]]:
     """Return the 2.5 and 97.5 % quantiles of coordinates whose derivatives tell nothing, by coordinate."""
     own = [k for k, c in enumerate(model.parameters.coordinates) if not BY_ID[c.effect.id].differentiable]
     if not own:
         return {}
-    walked = _walk(estimator, model)[BURN_IN:]
+    walked = _walk(estimator, model, seed)[BURN_IN:]
     ends = np.quantile(walked, (0.025, 0.975), axis=0)
     return {k: (float(ends[0, k]), float(ends[1, k])) for k in own}
 
 
-def _walk(estimator: Estimator, model: Model) -> Array:
+def _walk(estimator: Estimator, model: Model, seed: int) -> Array:
     """Return where a Metropolis walk went, shape (steps, coordinates)."""
     rng, residual = (
-        np.random.default_rng(len(model.errors)),
+        np.random.default_rng((seed, len(model.errors))),
         estimator.residual(model.parameters, model.tolerated),
     )
     low, high = model.parameters.bounds
