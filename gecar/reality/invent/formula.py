@@ -41,7 +41,8 @@ LEAST_SHARE = 0.15  # of the energy of left-out recordings: less describes nothi
 FEWEST = 3  # recordings to leave one out of; fewer are cut into as many parts in time
 RESAMPLES = 20
 STABLE = 0.6  # of the resamples must choose a term
-FORGIVING = 6.0  # standard deviations at which residuals are cut
+FEWEST_SAMPLES = 20
+CUT = 30.0  # standard deviations at which residuals are cut
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,9 @@ TARGETS = (
 )  # fmt: skip
 
 
-def describe(fitted: Sequence[RecordingResiduals], physics: npt.NDArray[Any]) -> tuple[Formula, ...]:
+def describe(
+    fitted: Sequence[RecordingResiduals], physics: npt.NDArray[Any], seed: int = 0
+) -> tuple[Formula, ...]:
     """Return formulas that describe what a model leaves, the most telling first.
 
     Chosen by leaving out fitted recordings alone: those set aside are for the judge.
@@ -111,12 +114,14 @@ def describe(fitted: Sequence[RecordingResiduals], physics: npt.NDArray[Any]) ->
         Recordings to find them on.
     physics
         Record of the model, shape (1,).
+    seed
+        Random seed of the resamples.
     """
     found = []
     tables = [_signals(run, physics) for run in fitted]
     for number, (target, unit) in enumerate(TARGETS):
         signals = _enough([table[number] for table in tables if len(table[number].residual)])
-        formula = _sparse(target, unit, signals) if signals else None
+        formula = _sparse(target, unit, signals, seed) if signals else None
         if formula is not None:
             found.append((formula.share * sum(s.energy for s in signals), formula))
     return tuple(formula for _, formula in sorted(found, key=lambda pair: -pair[0]))
@@ -130,19 +135,20 @@ def _enough(signals: list[_Signal]) -> list[_Signal]:
     return [_Signal(*pair) for residuals, terms in parts for pair in zip(residuals, terms, strict=True)]
 
 
-def _sparse(target: str, unit: str, signals: list[_Signal]) -> Formula | None:
-    chosen = _chosen(signals)
+def _sparse(target: str, unit: str, signals: list[_Signal], seed: int) -> Formula | None:
+    once = np.ones(len(signals), int)
+    chosen = _chosen(signals, once)
     if not chosen:
         return None
-    rng = np.random.default_rng(len(signals))
+    rng = np.random.default_rng((seed, len(signals)))
     votes = np.zeros(len(NAMES))
     for _ in range(RESAMPLES):
-        drawn = rng.integers(0, len(signals), len(signals))
-        votes[_chosen([signals[k] for k in drawn])] += 1.0 / RESAMPLES
+        counts = np.bincount(rng.integers(0, len(signals), len(signals)), minlength=len(signals))
+        votes[_chosen(signals, counts)] += 1.0 / RESAMPLES
     kept = [k for k in chosen if votes[k] >= STABLE]
     if not kept:
         return None
-    share = 1.0 - _left_out(signals, kept) / max(sum(s.energy for s in signals), 1e-12)
+    share = 1.0 - _left_out(signals, kept, once) / max(sum(s.energy for s in signals), 1e-12)
     if share < LEAST_SHARE:
         return None
     coefficients = _fitted(signals, kept)
@@ -151,13 +157,13 @@ def _sparse(target: str, unit: str, signals: list[_Signal]) -> Formula | None:
     )
 
 
-def _chosen(signals: list[_Signal]) -> list[int]:
-    """Return the terms that left-out recordings ask for, the most telling first."""
+def _chosen(signals: list[_Signal], counts: npt.NDArray[np.int_]) -> list[int]:
+    """Return the terms that left-out recordings ask for, the most telling first; each counts so many times."""
     chosen: list[int] = []
-    base = sum(s.energy for s in signals)
+    base = sum(n * s.energy for n, s in zip(counts, signals, strict=True))
     now = base
     while len(chosen) < MOST_TERMS:
-        scores = {k: _left_out(signals, [*chosen, k]) for k in range(len(NAMES)) if k not in chosen}
+        scores = {k: _left_out(signals, [*chosen, k], counts) for k in range(len(NAMES)) if k not in chosen}
         best = min(scores, key=lambda k: scores[k])
         if now - scores[best] < LEAST_GAIN * base:
             break
@@ -166,15 +172,17 @@ def _chosen(signals: list[_Signal]) -> list[int]:
     return chosen
 
 
-def _left_out(signals: list[_Signal], chosen: list[int]) -> float:
-    """Return the energy left in each recording by terms fitted to the others."""
+def _left_out(signals: list[_Signal], chosen: list[int], counts: npt.NDArray[np.int_]) -> float:
+    """Return the energy left in each recording by terms fitted to the others; all copies of one are left out."""
     at = np.ix_(chosen, chosen)
-    normal, pull = sum(s.normal[at] for s in signals), sum(s.pull[chosen] for s in signals)
+    drawn = [(int(n), s) for n, s in zip(counts, signals, strict=True) if n]
+    normal = sum(n * s.normal[at] for n, s in drawn)
+    pull = sum(n * s.pull[chosen] for n, s in drawn)
     ridge = 1e-6 * np.eye(len(chosen)) * (np.trace(normal) + 1e-12)
     left = 0.0
-    for s in signals:
-        c = np.linalg.solve(normal - s.normal[at] + ridge, pull - s.pull[chosen])
-        left += s.energy - 2.0 * float(c @ s.pull[chosen]) + float(c @ s.normal[at] @ c)
+    for n, s in drawn:
+        c = np.linalg.solve(normal - n * s.normal[at] + ridge, pull - n * s.pull[chosen])
+        left += n * (s.energy - 2.0 * float(c @ s.pull[chosen]) + float(c @ s.normal[at] @ c))
     return left
 
 
@@ -204,14 +212,17 @@ def _signals(run: RecordingResiduals, physics: npt.NDArray[Any]) -> list[_Signal
 
 
 def _signal(t: Array, terms: Array, at: Array, residual: Array, sd: float, memory: float) -> _Signal:
+    """Return residuals, and terms added up with the replay's memory, on an even grid whatever the rows."""
     seen = ~np.isnan(residual)
-    if seen.sum() < 20:
+    if seen.sum() < FEWEST_SAMPLES:
         return _Signal(np.zeros(0), np.zeros((0, len(NAMES))))
     step = float(np.median(np.diff(t)))
+    even = np.arange(t[0], t[-1] + step, step)
+    resampled = np.stack([np.interp(even, t, column) for column in terms.T], axis=1)
     keep = float(np.exp(-step / memory)) if np.isfinite(memory) else 1.0
-    drift = lfilter([step], [1.0, -keep], terms, axis=0)
-    felt = np.stack([np.interp(at[seen], t, column) for column in drift.T], axis=1) / sd
-    return _Signal(np.clip(residual[seen] / sd, -FORGIVING * 5, FORGIVING * 5), felt)
+    drift = lfilter([step], [1.0, -keep], resampled, axis=0)
+    filtered = np.stack([np.interp(at[seen], even, column) for column in drift.T], axis=1) / sd
+    return _Signal(np.clip(residual[seen] / sd, -CUT, CUT), filtered)
 
 
 NAMES = (
