@@ -25,7 +25,7 @@ from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.held_out import Confirmation, confirmed, dropped
-from gecar.reality.prove.holdout import judge
+from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case
@@ -37,7 +37,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import problem_of
 from gecar.reality.selection.stepwise import Explanation, explain
-from gecar.reality.selection.thresholds import MOTION, SENSOR, SENSOR_ON_A_DOUBTFUL_PATH
+from gecar.reality.selection.thresholds import MOTION, SENSOR, SENSOR_ON_A_DOUBTFUL_PATH, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.verdict import Found, Interval, Judgement, Misfit, Residual, Verdict
 from gecar.world.effects import CATALOGUE, Effect
@@ -110,13 +110,15 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     moved = _sized(context, confirmed(_explain_motion(context, residuals), aside))
     motion = moved.explained
     fitted = _along_paths(motion.problem.residuals, motion, motion.taken.physics)
-    held = _along_paths(_on_their_clocks(aside, motion), motion, motion.taken.physics)
+    held = _along_paths(_on_their_clocks(aside, motion, motion.taken.physics), motion, motion.taken.physics)
     seen = _explain_sensor(context, motion, fitted.of_sensor(), held.of_sensor())
     sensing = seen.explained if seen else None
     tell("alternatives, location")
     found = context.robot.with_effects({**motion.taken.values, **(sensing.taken.values if sensing else {})})
-    if sensing and sensing.steps:
-        held = _along_paths(_on_their_clocks(aside, motion), motion, found.physics)
+    before, after = (
+        Contender(robot, _along_paths(_on_their_clocks(aside, motion, robot.physics), motion, robot.physics))
+        for robot in (context.robot, found)
+    )
     effects, rivals = _findings(context.robot, [each for each in (moved, seen) if each])
     where = _located(context, motion, sensing, fitted, found)
     unexplained = motion.unexplained or bool(sensing and sensing.unexplained)
@@ -126,10 +128,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         verdict=word,
         effects=effects,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
-        judgement=Judgement(
-            tuple(r.name for r in split.held), split.by_time, judge(held, context.robot, found)
-        ),
-        residual=_what_is_left(context, motion, fitted, held, found, unexplained),
+        judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
+        residual=_what_is_left(context, motion, sensing, fitted, after, unexplained),
         next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
         robot=found.model_copy(update={"name": f"{context.robot.name}-{name}"}),
         fitted_on=tuple(r.name for r in split.fitted),
@@ -140,7 +140,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             where.doubted,
             [step.effect for each in (moved, seen) if each for step in each.candidates],
         ),
-        evidence=Evidence(motion, sensing, where, fitted, held, context.robot),
+        evidence=Evidence(motion, sensing, where, fitted, after.held, context.robot),
     )
 
 
@@ -154,9 +154,9 @@ def _explain_motion(context: _Context, residuals: Residuals) -> Explanation:
     return replace(motion, unexplained=spot is not None, spot=spot)
 
 
-def _on_their_clocks(held: Residuals, motion: Explanation) -> Residuals:
+def _on_their_clocks(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
     """Return the recordings set aside with their camera clocks fitted, if those of the others were."""
-    return with_fitted_clocks(held, motion.taken.physics)[0] if motion.problem.clocks_fitted else held
+    return with_fitted_clocks(held, physics)[0] if motion.problem.clocks_fitted else held
 
 
 def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
@@ -244,21 +244,26 @@ def _located(
 def _what_is_left(
     context: _Context,
     motion: Explanation,
+    sensing: Explanation | None,
     fitted: Residuals,
-    held: Residuals,
-    found: Robot,
+    found: Contender,
     unexplained: bool,
 ) -> Residual:
     """Return whether what is left is white, and formulas for what nothing explains."""
-    white, p = whiteness(motion.problem, motion.taken)
-    described = describe(fitted.recordings, motion.taken.physics) if motion.unexplained else ()
-    gained = _with_formulas(held, found, described) if context.with_formula and described else None
-    return Residual(white and not unexplained, p, "; ".join(map(str, described)) or None, gained)
+    parts = [each for each in (motion, sensing) if each]
+    # Of motion and readings, the less likely p-value counts, times two (Bonferroni).
+    p = min(1.0, len(parts) * min(whiteness(each.problem, each.taken, context.seed)[1] for each in parts))
+    described: tuple[Formula, ...] = ()
+    if motion.unexplained:
+        described = describe(fitted.recordings, motion.taken.physics, context.seed)
+    gained = _with_formulas(found, described) if context.with_formula and described else None
+    words = "; ".join(map(str, described)) or None
+    return Residual(p > SIGNIFICANCE and not unexplained, p, words, gained)
 
 
-def _with_formulas(held: Residuals, found: Robot, formulas: Sequence[Formula]) -> dict[str, Misfit]:
+def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, Misfit]:
     """Judge what formulas added to the robot found gain on the recordings set aside."""
-    misfits = judge(held, found, found, with_formulas(formulas))
+    misfits = judge(found, replace(found, correction=with_formulas(formulas)))
     return {column: m for column, m in misfits.items() if m.before != m.after}
 
 

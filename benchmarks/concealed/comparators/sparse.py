@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 from gecar.reality.discovery import MEMORY_S
 from gecar.reality.fitting.parameters import Coordinate, free
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.prove.holdout import judge
+from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import hold_out
@@ -65,7 +65,9 @@ def sparse_regression(case: Case, holdout: Sequence[str]) -> dict[str, Any]:
             known[field], size, sd
         )
     after = robot.with_effects({e: {label: i.value for label, i in p.items()} for e, p in effects.items()})
-    judged = Judgement((), False, judge(held, robot, after))
+    judged = Judgement(
+        (), False, judge(Contender(robot, held), Contender(after, held.with_paths(after.physics)))
+    )
     return {
         "verdict": "missing" if effects else "nothing",
         "effects": [

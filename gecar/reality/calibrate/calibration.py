@@ -27,7 +27,7 @@ from gecar.reality.calibrate.constant_fit import fitted
 from gecar.reality.calibrate.constants import MARK, Constant, FreeConstants, chosen, with_constants
 from gecar.reality.calibrate.identifiability import BLIND, at_bounds, sensitivities, told_apart
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
-from gecar.reality.prove.holdout import judge
+from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.camera_frame import corrected
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
@@ -260,12 +260,19 @@ def _judged(
     """Return misfits over what is held out, and of each recording, by column."""
     everyone = parts.held if parts.by_time else (*parts.fitted, *parts.held)
     with Threads() as threads:
-        beside = _motion_residuals(everyone, noise, threads).with_paths(after.physics)
-        alone = {run.recording.name: replace(beside, recordings=(run,)) for run in beside.recordings}
-        each = {r.name: _moving(r, judge(alone[r.name], before, after)) for r in everyone}
-        names = {r.name for r in parts.held}
-        held = tuple(run for run in beside.recordings if run.recording.name in names)
-        return judge(replace(beside, recordings=held), before, after), each
+        contenders = [
+            Contender(robot, _motion_residuals(everyone, noise, threads).with_paths(robot.physics))
+            for robot in (before, after)
+        ]
+        each = {r.name: _moving(r, judge(*(_only(c, {r.name}) for c in contenders))) for r in everyone}
+        held = {r.name for r in parts.held}
+        return judge(*(_only(c, held) for c in contenders)), each
+
+
+def _only(contender: Contender, names: set[str]) -> Contender:
+    """Return a contender on some of its recordings."""
+    runs = tuple(run for run in contender.held.recordings if run.recording.name in names)
+    return replace(contender, held=replace(contender.held, recordings=runs))
 
 
 def _moving(recording: Recording, misfits: dict[str, Misfit]) -> dict[str, Misfit]:

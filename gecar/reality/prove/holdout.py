@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -27,40 +28,57 @@ _ROW = {"left_angle_rad": 0, "right_angle_rad": 1, "battery_v": 2, "yaw_rate_rad
 _POSE = {"x_m": 0, "y_m": 1, "heading_rad": 2}
 
 
-def judge(
-    held: Residuals, before: Robot, after: Robot, correction: Correction | None = None
-) -> dict[str, Misfit]:
+@dataclass(frozen=True)
+class Contender:
+    """A robot, and the recordings set aside with the nuisances fitted under it.
+
+    Attributes
+    ----------
+    robot
+        Is judged.
+    held
+        The recordings beside their simulation: clocks and paths as this robot gives them.
+    correction
+        Applied to its replays: a formula added, for instance.
+    """
+
+    robot: Robot
+    held: Residuals
+    correction: Correction | None = None
+
+
+def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
     """Compare two robots on recordings neither was fitted to, whole and open loop, by column of the file.
 
-    Parameters
-    ----------
-    held
-        The recordings beside their simulation, with paths where the colour sensor read something.
-    before, after
-        The robots.
-    correction
-        Applied to the second one's replays: a formula added, for instance.
+    Each is judged with its own nuisances. The floor is what noise leaves, and on readings the uncertainty of the first
+    robot's path: it is known before anything is fitted.
     """
-    errors: dict[str, list[Array]] = {}
-    spread: dict[str, list[Array]] = {}
-    for run in held.recordings:
-        both = [_errors(run, before, None), _errors(run, after, correction)]
-        for field, _ in _FIELDS:
-            values = getattr(run.recording, field)
-            if not np.isnan(values).all() and field in both[0]:
-                errors.setdefault(field, []).append(np.stack([each[field] for each in both]))
-                spread.setdefault(field, []).append(values - np.nanmean(values))
-    floors = _floors(held) if held.recordings else {}
+    floors = _floors(before.held) if before.held.recordings else {}
+    was, now = _errors_by_field(before), _errors_by_field(after)
     out = {}
     for field, column in _FIELDS:
-        if field in errors:
-            deviation = _rms(np.concatenate(spread[field]))
-            pair = np.concatenate(errors[field], axis=1)
-            sizes = [_rms(pair[k]) / max(deviation, 1e-12) for k in range(2)]
-            # What a robot reaches, noise allows: the floor's estimate is cautious.
-            floor = min(float(floors[field]) / max(deviation, 1e-12), *sizes)
-            out[column] = Misfit(sizes[0], sizes[1], floor)
+        if field in was and field in now:
+            deviation = max(_rms(_deviations(before.held, field)), 1e-12)
+            sizes = (_rms(was[field]), _rms(now[field]), float(floors[field]))
+            out[column] = Misfit(*(size / deviation for size in sizes))
     return out
+
+
+def _errors_by_field(contender: Contender) -> dict[str, Array]:
+    """Return measured less simulated over all recordings, by field of a recording."""
+    errors: dict[str, list[Array]] = {}
+    for run in contender.held.recordings:
+        for field, values in _errors(run, contender.robot, contender.correction).items():
+            if not np.isnan(getattr(run.recording, field)).all():
+                errors.setdefault(field, []).append(values)
+    return {field: np.concatenate(parts) for field, parts in errors.items()}
+
+
+def _deviations(held: Residuals, field: str) -> Array:
+    """Return what was measured, less its mean, over all recordings that have it."""
+    runs = (run for run in held.recordings if field != "reflection_pct" or run.reads)
+    values = (getattr(run.recording, field) for run in runs)
+    return np.concatenate([v - np.nanmean(v) for v in values if not np.isnan(v).all()])
 
 
 def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None) -> dict[str, Array]:
