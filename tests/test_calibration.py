@@ -172,6 +172,34 @@ def test_calibrate_writes_a_robot_that_loads(gecar, tmp_path):
     assert robot.battery.voltage == pytest.approx(ended.json["constants"]["battery.voltage"]["value"])
 
 
+def test_constants_that_do_not_explain_the_misfit_are_told_and_discover_is_named():
+    """Viscous friction and a wide track, of which only the track is a constant that is fitted."""
+    robot = NOMINAL.with_effects(
+        {"viscous_friction": {"coefficient_nms": 0.003}, "track_width": {"scale": 1.06}}
+    )
+    recordings = tuple(
+        trial(f"run_{k}", robot, SENSOR_FREE.replace("60,40", f"{60 - 10 * k},{30 + 10 * k}"), seed=k)
+        for k in range(3)
+    )
+    result = calibrate(Case("p09", recordings), ["run_2"], names=["body.track_width"])
+    assert "left_angle_deg" in result.unexplained
+    assert "gecar discover" in "\n".join(calibration_lines(result))
+    assert calibrated().unexplained == calibrated().worse == ()
+
+
+def test_a_robot_file_of_a_bench_is_enough(tmp_path):
+    file = tmp_path / "motor.toml"
+    file.write_text(
+        "name = 'motor'\n[motor]\ntorque_constant = 0.3\nback_emf_constant = 0.46\nresistance = 6.8\n"
+        "inertia = 0.0025\ncoulomb_friction = 0.02\n[battery]\nvoltage = 7.0\nresistance = 0.0\n[drive]\nduty_cap = 1.0\n"
+    )
+    runs = (
+        replace(bench(level), setup=replace(bench(level).setup, robot=str(file))) for level in (0.3, 0.6, 0.9)
+    )
+    result = calibrate(Case("bench", tuple(runs)), names=["battery.voltage"])
+    assert [f.constant.name for f in result.fitted] == ["battery.voltage"]
+
+
 def test_bad_input_is_one_line(gecar, tmp_path):
     (tmp_path / "case").mkdir()
     write_recording(bench(0.5), tmp_path / "case/one.csv")

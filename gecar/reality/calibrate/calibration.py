@@ -29,12 +29,13 @@ from gecar.reality.calibrate.identifiability import BLIND, at_bounds, sensitivit
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.camera_frame import corrected
+from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.verdict import Misfit
-from gecar.world.robot import Robot, load_robot
+from gecar.reality.verdict import VISIBLE, Misfit
+from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,8 @@ FEWEST_GROUPS = 5
 # What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
 TRUST_STEPS = 0.15
 ROUNDS = 4
+WORSE = 1.1  # times the misfit before
+EXPLAINED = 0.9  # share of the misfit above noise that constants which explain it take away
 COURSE = (
     "line_dx",
     "line_dy",
@@ -106,6 +109,22 @@ class Calibration:
     channels: Mapping[str, Misfit]
     recordings: Mapping[str, Mapping[str, Misfit]]
 
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """Columns in which the new constants do worse on what is held out."""
+        return tuple(
+            c for c, m in self.channels.items() if m.after > max(WORSE * m.before, VISIBLE * m.floor)
+        )
+
+    @property
+    def unexplained(self) -> tuple[str, ...]:
+        """Columns in which the new constants leave a visible part of the misfit on what is held out."""
+        return tuple(
+            c
+            for c, m in self.channels.items()
+            if m.after > VISIBLE * m.floor and m.before - m.after < EXPLAINED * (m.before - m.floor)
+        )
+
 
 def calibrate(
     case: Case,
@@ -135,7 +154,7 @@ def calibrate(
         If a name is unknown, or a robot or course file is wrong.
     """
     constants, parts = chosen(names), hold_out(case, holdout)
-    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
+    known = robot if robot is not None else known_robot(case.recordings[0])
     noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
     tell(f"fitting on {', '.join(r.name for r in parts.fitted)}")
     with Threads() as threads:
