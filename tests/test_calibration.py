@@ -191,7 +191,8 @@ def test_a_robot_file_of_a_bench_is_enough(tmp_path):
     file = tmp_path / "motor.toml"
     file.write_text(
         "name = 'motor'\n[motor]\ntorque_constant = 0.3\nback_emf_constant = 0.46\nresistance = 6.8\n"
-        "inertia = 0.0025\ncoulomb_friction = 0.02\n[battery]\nvoltage = 7.0\nresistance = 0.0\n[drive]\nduty_cap = 1.0\n"
+        "inertia = 0.0025\ncoulomb_friction = 0.02\n[battery]\nvoltage = 7.0\nresistance = 0.0\n"
+        "[drive]\nduty_cap = 1.0\n"
     )
     runs = (
         replace(bench(level), setup=replace(bench(level).setup, robot=str(file))) for level in (0.3, 0.6, 0.9)

@@ -1,7 +1,7 @@
 """The recording to make next: from a library of command sequences a robot can drive, the one that tells most.
 
 Each is driven by the robot as found and by its rival, the robot with the confused effect exchanged or with a parameter
-at the end of its interval; the sequence where camera and encoders see them part furthest, in standard deviations, wins.
+at the end of its interval; chosen is the sequence in which their sensors differ most, in standard deviations.
 """
 
 from __future__ import annotations
@@ -14,15 +14,19 @@ import numpy.typing as npt
 from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
+from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.verdict import Found, NextRecording
+from gecar.world.course import Course, load_course
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Commands = tuple[tuple[float, float, float], ...]
 
 ROW_S = 0.01
-START = (1.2, 0.6, 0.0)  # m, m, rad: the middle of the paper's course
+START = (1.2, 0.6, 0.0)  # m, m, rad, where there is no course
+LEAST_DIFFERENCE = 9.0  # squared standard deviations: less tells nothing
 
 
 def _holds(length_s: float, *duties: tuple[float, float]) -> Commands:
@@ -74,17 +78,19 @@ def suggest(
     """
     if rivals:
         confused = next(f for f in found if f.alternatives)
-        name = _telling(robot, rivals[0], like, noise)
-        return NextRecording(
-            f"{name}: tells {confused.id} from {' and '.join(confused.alternatives)}", LIBRARY[name]
-        )
+        others = " and ".join(confused.alternatives)
+        name, apart = _telling(robot, rivals[0], like, noise)
+        if apart < LEAST_DIFFERENCE:
+            words = f"{name}: no sequence of the library tells {confused.id} from {others} with these sensors"
+            return NextRecording(words, LIBRARY[name])
+        return NextRecording(f"{name}: tells {confused.id} from {others}", LIBRARY[name])
     if unexplained:
         name = "long and slow, then long and fast"
         return NextRecording(
             f"{name}: shows whether what is left depends on speed, way or time", LIBRARY[name]
         )
     if found:
-        name = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
+        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
         return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
     words = "reversals: nothing is missing so far; this asks most of gears, friction and grip"
     return NextRecording(words, LIBRARY["reversals"])
@@ -97,20 +103,49 @@ def _at_interval_end(robot: Robot, found: Found) -> Robot:
     return robot.with_effects({found.id: {**values, label: interval.high}})
 
 
-def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> str:
-    return max(LIBRARY, key=lambda name: _difference(LIBRARY[name], robot, rival, like, noise))
+def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, float]:
+    """Return the sequence in which two robots part furthest, and how far [squared standard deviations]."""
+    apart = {name: difference(commands, robot, rival, like, noise) for name, commands in LIBRARY.items()}
+    best = max(apart, key=lambda name: apart[name])
+    return best, apart[best]
 
 
-def _difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
-    """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations."""
-    blank = _recording(commands, {}, like)
-    rows = replayer_of(blank, noise.sd).play(robot.physics, np.array(START)).rows
-    angles = {"left_angle_deg": np.degrees(rows[:, 0]), "right_angle_deg": np.degrees(rows[:, 1])}
-    poses = {"x_m": rows[:, 4], "y_m": rows[:, 5], "heading_deg": np.degrees(rows[:, 6])}
-    seen = {**angles, **(poses if like.setup.rig == "floor" else {})}
-    replayer = replayer_of(_recording(commands, seen, like), noise.sd, noise.walk, memory_s=1.0)
-    _, row_errors, _, pose_errors = replayer.play(rival.physics)
-    return float(np.nansum(row_errors[:, :2] ** 2) + np.nansum(pose_errors**2))
+def difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
+    """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations.
+
+    What encoders and camera would measure of the first is replayed by the second; what the colour sensors of both would
+    read is compared along the first one's path, on the course of a recording that read one.
+    """
+    course = _course_of(like)
+    start = START if course is None else (course.start.x_m, course.start.y_m, course.start.heading_rad)
+    rows = replayer_of(_recording(commands, {}, like), noise.sd).play(robot.physics, np.array(start)).rows
+    angles = {
+        "left_angle_deg": np.degrees(rows[:, LEFT_ANGLE]),
+        "right_angle_deg": np.degrees(rows[:, RIGHT_ANGLE]),
+    }
+    poses = {"x_m": rows[:, X], "y_m": rows[:, Y], "heading_deg": np.degrees(rows[:, HEADING])}
+    measured = {**angles, **(poses if like.setup.rig == "floor" else {})}
+    replayer = replayer_of(_recording(commands, measured, like), noise.sd, noise.walk, memory_s=1.0)
+    found = replayer.play(rival.physics)
+    apart = float(np.nansum(found.row_errors[:, :2] ** 2) + np.nansum(found.pose_errors**2))
+    if course is None:
+        return apart
+    path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
+    own, other = (_readings(replayer.t, path, course, r, noise.reflection_sd) for r in (robot, rival))
+    return apart + float(np.sum((own - other) ** 2)) / noise.reflection_sd**2
+
+
+def _course_of(like: Recording) -> Course | None:
+    """Return the course a recording's colour sensor read; None if there is none."""
+    reads = like.setup.rig == "floor" and like.setup.course != "none" and "reflection_pct" in like.measured
+    return load_course(like.setup.course) if reads else None
+
+
+def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
+    readings = np.empty(len(t))
+    floor, pitch = course.raster(course.pitch_m), course.pitch_m
+    readings_along(t, path, 0.0, sd, floor, pitch, robot.physics, np.zeros(3), readings)
+    return readings
 
 
 def _recording(commands: Commands, seen: dict[str, Array], like: Recording) -> Recording:
