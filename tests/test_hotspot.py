@@ -8,7 +8,7 @@ import numpy as np
 from test_discovery import EV3, recorded
 
 from gecar.reality.discovery import discover
-from gecar.reality.locate.hotspot import loudest_place
+from gecar.reality.locate.hotspot import strongest_place
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.selection.thresholds import HOTSPOT
 
@@ -28,7 +28,7 @@ def test_a_kick_at_one_place_is_unexplained_though_hardly_anything_is_left_on_th
     verdict = discover(Case("made", tuple(kicked(r, middle) for r in runs)))
     assert verdict.verdict == "unexplained"
     motion = verdict.evidence.motion.problem
-    score, spot = loudest_place(motion, motion.known)
+    score, spot = strongest_place(motion, motion.known)
     assert score > HOTSPOT
     assert abs(spot[0] - middle) < 0.25
     assert {place.regime for place in verdict.located if place.channel == "heading"} == {"place on the floor"}
@@ -37,7 +37,7 @@ def test_a_kick_at_one_place_is_unexplained_though_hardly_anything_is_left_on_th
 def test_noise_stands_out_nowhere() -> None:
     verdict = discover(Case("made", tuple(recorded(EV3, seed) for seed in range(5))))
     motion = verdict.evidence.motion.problem
-    assert loudest_place(motion, motion.known)[0] < 0.7 * HOTSPOT
+    assert strongest_place(motion, motion.known)[0] < 0.7 * HOTSPOT
 
 
 def test_without_poses_there_is_no_place() -> None:
@@ -45,4 +45,4 @@ def test_without_poses_there_is_no_place() -> None:
     gone = np.full_like(runs[0].t_s, np.nan)
     blind = [replace(r, x_m=gone, y_m=gone, heading_rad=gone) for r in runs]
     verdict = discover(Case("made", tuple(blind)))
-    assert loudest_place(verdict.evidence.motion.problem, verdict.evidence.motion.problem.known)[0] == 0.0
+    assert strongest_place(verdict.evidence.motion.problem, verdict.evidence.motion.problem.known)[0] == 0.0

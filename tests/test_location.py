@@ -46,7 +46,7 @@ def test_a_stretch_s_start_is_a_nuisance_however_far_off() -> None:
     assert (per_sample < 1.5).all()
 
 
-def test_loudness_shows_the_sensor_and_the_time_of_what_went_wrong() -> None:
+def test_misfit_energy_shows_the_sensor_and_the_time_of_what_went_wrong() -> None:
     run = recorded(EV3, 1)
     pushed = run.heading_rad + np.where(run.t_s > 5.0, 0.2, 0.0)
     before, _, samples, _ = misfit_energy(
@@ -73,12 +73,12 @@ def test_what_is_pointed_at_first_is_the_loudest_sensor_and_its_loudest_spans() 
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     where, first = verdict.evidence.where, verdict.located[0]
     assert first.channel in {"left_angle", "right_angle"}
-    assert int(np.argmax(where.loud.sum(axis=(1, 2)))) == 0
+    assert int(np.argmax(where.stretch_energy.sum(axis=(1, 2)))) == 0
     of = next(k for k, s in enumerate(where.runs) if s.recording.name == first.recording)
-    spans = np.zeros(where.loud.shape[2], bool)
+    spans = np.zeros(where.stretch_energy.shape[2], bool)
     for start, end in first.times_s:
         spans[round(start / 0.2) : round(end / 0.2)] = True
-    assert where.loud[0, of, spans].min() >= where.loud[0, of, ~spans].max()
+    assert where.stretch_energy[0, of, spans].min() >= where.stretch_energy[0, of, ~spans].max()
 
 
 @pytest.mark.parametrize("missing", [(), ("left_angle_rad", "right_angle_rad")])

@@ -9,7 +9,7 @@ import pytest
 from linear_case import EV3, bumps, linear, linear_problem
 
 from gecar.reality.noise.excess_energy import Blocks
-from gecar.reality.prove.held_out import confirmed
+from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.selection import stepwise
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains

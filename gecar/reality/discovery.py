@@ -24,7 +24,7 @@ from gecar.reality.locate.hotspot import hotspot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.prove.held_out import Confirmation, confirmed, dropped
+from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.known_robot import known_robot
@@ -102,93 +102,97 @@ def discover(
 
 def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     """Return the verdict, stage by stage."""
-    split, tell = context.split, context.tell
-    tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
-    noise = estimate_noise(split.fitted, context.robot.physics, MEMORY_S)
-    aside = motion_residuals(split.held, noise, MEMORY_S, threads)
-    residuals = motion_residuals(split.fitted, noise, MEMORY_S, threads)
-    moved = _sized(context, confirmed(_explain_motion(context, residuals), aside))
-    motion = moved.explained
-    fitted = _along_paths(motion.problem.residuals, motion, motion.taken.physics)
-    held = _along_paths(_on_their_clocks(aside, motion, motion.taken.physics), motion, motion.taken.physics)
-    seen = _explain_sensor(context, motion, fitted.of_sensor(), held.of_sensor())
-    sensing = seen.explained if seen else None
-    tell("alternatives, location")
-    found = context.robot.with_effects({**motion.taken.values, **(sensing.taken.values if sensing else {})})
-    before, after = (
-        Contender(robot, _along_paths(_on_their_clocks(aside, motion, robot.physics), motion, robot.physics))
-        for robot in (context.robot, found)
+    split, known = context.split, context.robot
+    context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
+    noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
+    fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
+    motion = _explain_motion(context, fitted, held)
+    fitted = _along_paths(
+        motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
     )
-    effects, rivals = _findings(context.robot, [each for each in (moved, seen) if each])
-    where = _located(context, motion, sensing, fitted, found)
-    unexplained = motion.unexplained or bool(sensing and sensing.unexplained)
+    sensing = _explain_sensor(context, motion.explained, fitted, held)
+    stages = [stage for stage in (motion, sensing) if stage]
+    found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
+    before, after = (
+        Contender(robot, _with_nuisances(held, motion.explained, robot.physics)) for robot in (known, found)
+    )
+    context.tell("alternatives, location")
+    effects, rivals = _findings(known, stages)
+    unexplained = any(stage.explained.unexplained for stage in stages)
     word = _word(bool(effects), unexplained)
+    where = _located(context, stages, fitted, found)
     return Verdict(
         case=name,
         verdict=word,
         effects=effects,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
-        residual=_what_is_left(context, motion, sensing, fitted, after, unexplained),
+        residual=_what_is_left(context, stages, fitted, after),
         next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
-        robot=found.model_copy(update={"name": f"{context.robot.name}-{name}"}),
+        robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
         fitted_on=tuple(r.name for r in split.fitted),
         notes=notes_on(
             split,
             fitted,
-            motion.problem.clocks_fitted,
+            motion.explained.problem.clocks_fitted,
             where.doubted,
-            [step.effect for each in (moved, seen) if each for step in each.candidates],
+            [step.effect for stage in stages for step in stage.candidates],
         ),
-        evidence=Evidence(motion, sensing, where, fitted, after.held, context.robot),
+        evidence=Evidence(
+            motion.explained, sensing.explained if sensing else None, where, fitted, after.held, known
+        ),
     )
 
 
-def _explain_motion(context: _Context, residuals: Residuals) -> Explanation:
+@dataclass(frozen=True)
+class _Stage(Confirmation):
+    """What was explained and confirmed, with the 95 % intervals of its parameters by effect and label."""
+
+    spans: Mapping[str, Mapping[str, Interval]]
+
+
+def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
     """Explain how the robot moved; what is left at one place of the floor counts where nothing else is."""
-    catalogue = observable(context.catalogue, residuals)
-    motion = explain(problem_of(residuals, context.robot, catalogue, MOTION, context.seed, context.tell))
-    if motion.unexplained or motion.steps:
+    catalogue = observable(context.catalogue, fitted)
+    problem = problem_of(fitted, context.robot, catalogue, MOTION, context.seed, context.tell)
+    motion = _with_intervals(context, confirmed(explain(problem), held))
+    explained = motion.explained
+    if explained.unexplained or explained.steps:
         return motion
-    spot = hotspot(motion.problem, motion.left)
-    return replace(motion, unexplained=spot is not None, spot=spot)
-
-
-def _on_their_clocks(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
-    """Return the recordings set aside with their camera clocks fitted, if those of the others were."""
-    return with_fitted_clocks(held, physics)[0] if motion.problem.clocks_fitted else held
-
-
-def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
-    """Return recordings with the path their colour sensor took, as a model of the robot gives it."""
-    inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
-    return residuals.localised(physics).with_paths(physics, inflation)
+    spot = hotspot(explained.problem, explained.left)
+    return replace(motion, explained=replace(explained, unexplained=spot is not None, spot=spot))
 
 
 def _explain_sensor(
-    context: _Context, motion: Explanation, residuals: Residuals, held: Residuals
-) -> _Sized | None:
+    context: _Context, motion: Explanation, fitted: Residuals, held: Residuals
+) -> _Stage | None:
     """Explain what the colour sensor read along the measured path; None where it read nothing."""
+    residuals = fitted.of_sensor()
     if not residuals.recordings:
         return None
     # A late camera and a skewed clock shift what is read, too.
     known = context.robot.with_effects(motion.taken.values)
     limits = SENSOR_ON_A_DOUBTFUL_PATH if motion.unexplained else SENSOR
     catalogue = observable(context.catalogue, residuals)
-    sensing = explain(problem_of(residuals, known, catalogue, limits, context.seed, context.tell))
-    seen = confirmed(sensing, held)
+    problem = problem_of(residuals, known, catalogue, limits, context.seed, context.tell)
+    seen = confirmed(explain(problem), _with_nuisances(held, motion, motion.taken.physics).of_sensor())
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
-    return _sized(context, replace(seen, explained=replace(seen.explained, taken=taken)))
+    return _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
 
 
-@dataclass(frozen=True)
-class _Sized(Confirmation):
-    """What was confirmed, with the 95 % intervals of its parameters by effect and label."""
+def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
+    """Return the recordings set aside with the nuisances of those fitted on, fitted anew under a robot's physics."""
+    clocked = with_fitted_clocks(held, physics)[0] if motion.problem.clocks_fitted else held
+    return _along_paths(clocked, motion, physics)
 
-    spans: Mapping[str, Mapping[str, Interval]]
+
+def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
+    """Return recordings with the path their colour sensor took, as a robot's physics gives it."""
+    inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
+    return residuals.localised(physics).with_paths(physics, inflation)
 
 
-def _sized(context: _Context, confirmation: Confirmation) -> _Sized:
+def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
     """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate."""
     explained, candidates = confirmation.explained, confirmation.candidates
     context.tell("intervals")
@@ -196,38 +200,33 @@ def _sized(context: _Context, confirmation: Confirmation) -> _Sized:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
         absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
         if not absent:
-            return _Sized(explained, candidates, spans)
+            return _Stage(explained, candidates, spans)
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
 
 
-def _findings(known: Robot, explanations: Sequence[_Sized]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
+def _findings(known: Robot, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
     """Return what was found, and robots with an alternative in its place."""
     found, rivals = list[Found](), list[Robot]()
-    for sized in explanations:
+    for stage in stages:
         beside = {
             effect: values
-            for other in explanations
-            if other is not sized
+            for other in stages
+            if other is not stage
             for effect, values in other.explained.taken.values.items()
         }
-        for step in sized.explained.steps:
-            others = alternatives(sized.explained, step)
+        for step in stage.explained.steps:
+            others = alternatives(stage.explained, step)
             rivals += [known.with_effects({**beside, **model.values}) for model in others.values()]
             gain, null = step.holdout_gain, step.null_95
-            found.append(Found(step.effect, tuple(others), sized.spans[step.effect], gain, null, step.p))
+            found.append(Found(step.effect, tuple(others), stage.spans[step.effect], gain, null, step.p))
     return tuple(found), tuple(rivals)
 
 
-def _located(
-    context: _Context,
-    motion: Explanation,
-    sensing: Explanation | None,
-    fitted: Residuals,
-    found: Robot,
-) -> MismatchMap:
+def _located(context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Robot) -> MismatchMap:
     """Return where simulation and reality part."""
-    sensor_unexplained = bool(sensing and sensing.unexplained)
+    motion = stages[0].explained
+    sensor_unexplained = any(stage.explained.unexplained for stage in stages[1:])
     return MismatchMap(
         fitted.recordings,
         motion.problem.known.errors,
@@ -242,23 +241,18 @@ def _located(
 
 
 def _what_is_left(
-    context: _Context,
-    motion: Explanation,
-    sensing: Explanation | None,
-    fitted: Residuals,
-    found: Contender,
-    unexplained: bool,
+    context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Contender
 ) -> Residual:
     """Return whether what is left is white, and formulas for what nothing explains."""
-    parts = [each for each in (motion, sensing) if each]
-    # Of motion and readings, the less likely p-value counts, times two (Bonferroni).
+    parts = [stage.explained for stage in stages]
+    # Of motion and readings, the smaller p-value counts, times their number (Bonferroni).
     p = min(1.0, len(parts) * min(whiteness(each.problem, each.taken, context.seed)[1] for each in parts))
-    described: tuple[Formula, ...] = ()
+    motion, described = parts[0], tuple[Formula, ...]()
     if motion.unexplained:
         described = describe(fitted.recordings, motion.taken.physics, context.seed)
     gained = _with_formulas(found, described) if context.with_formula and described else None
-    words = "; ".join(map(str, described)) or None
-    return Residual(p > SIGNIFICANCE and not unexplained, p, words, gained)
+    white = p > SIGNIFICANCE and not any(each.unexplained for each in parts)
+    return Residual(white, p, "; ".join(map(str, described)) or None, gained)
 
 
 def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, Misfit]:

@@ -181,13 +181,13 @@ class _Constants:
     unknown: tuple[UnknownConstant, ...]
 
 
-def _taken(robot: Robot, settled: _Constants) -> Robot:
-    return with_constants(robot, {f.constant.name: f.value for f in settled.fitted})
+def _taken(robot: Robot, constants: _Constants) -> Robot:
+    return with_constants(robot, {f.constant.name: f.value for f in constants.fitted})
 
 
-def _camera(settled: _Constants, fields: Sequence[str]) -> Array:
+def _camera(constants: _Constants, fields: Sequence[str]) -> Array:
     """Return what was fitted of the camera, 0 where nothing was, shape (fields,)."""
-    found = {f.constant.kernel: f.value for f in settled.fitted if f.constant.section == "camera"}
+    found = {f.constant.kernel: f.value for f in constants.fitted if f.constant.section == "camera"}
     return np.array([found.get(field, 0.0) for field in fields])
 
 

@@ -91,7 +91,7 @@ class Step:
     stage
         At which stage of a chain it was tried, from 0.
     holdout_gain
-        What it lowers the cost of the recordings set aside by, beside the others refitted without it.
+        What it lowers the cost of the recordings set aside by, against the others refitted without it.
     """
 
     effect: str

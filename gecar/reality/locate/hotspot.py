@@ -19,11 +19,11 @@ LEAST_BLOCKS = 10
 
 def hotspot(problem: Problem, model: Model) -> tuple[float, float] | None:
     """Return the place [m] at which a model of motion leaves excess energy; None if there is none, or no poses."""
-    score, place = loudest_place(problem, model)
+    score, place = strongest_place(problem, model)
     return place if score >= HOTSPOT else None
 
 
-def loudest_place(problem: Problem, model: Model) -> tuple[float, tuple[float, float]]:
+def strongest_place(problem: Problem, model: Model) -> tuple[float, tuple[float, float]]:
     """Return the largest excess energy in a cell of the floor, in standard deviations of noise, and where."""
     cells = _cells(problem, model)
     there = ~np.isnan(cells[:, 0])

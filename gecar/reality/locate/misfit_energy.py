@@ -113,7 +113,7 @@ def _of_poses(replayer: Replayer, poses: Array) -> list[tuple[int, Array, Array]
 
 
 def _add_readings(run: RecordingResiduals, before: Physics, after: Physics, out: Array, bin_s: float) -> None:
-    """Add what the colour sensor saw, in standard deviations of a reading; what the path leaves is no news."""
+    """Add what the colour sensor saw, in standard deviations of a reading; what the path leaves is expected."""
     read = run.recording.reflection_pct
     assert run.nuisances.path is not None
     reading_sd = run.nuisances.path.reading_sd

@@ -22,20 +22,20 @@ Physics = npt.NDArray[Any]
 
 ON_THE_FLOOR = "place on the floor"
 BIN_S = 0.1
-SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happened there is felt
+SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what happens there has an effect
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
-FAINT = 0.02  # of the loudest channel's energy, of motion or of sight: less is not worth an entry
+FAINT = 0.02  # of the strongest channel's energy, of motion or of sight: less is not worth an entry
 SPAN_BINS = 2  # bins a span is made of
-LOUDEST = 0.25  # of a channel's energy lies in the spans that are pointed at
+STRONGEST = 0.25  # of a channel's energy lies in the spans that are pointed at
 GROUPS = (
     [0, 1],
     [2],
     [3],
     [4, 5, 6],
     [REFLECTION],
-)  # channels that one sensor measures: they are loud together
+)  # channels that one sensor measures: they are strong together
 POSE_GROUP, READING_GROUP = 3, 4
 _GROUP = np.repeat(range(len(GROUPS)), [len(group) for group in GROUPS])
 
@@ -66,7 +66,7 @@ class MismatchMap:
     energy
         Summed squares of a bin's innovations, less noise, shape (channels, recordings, bins); 0 where nothing was
         measured: it is high where an error begins. Readings have no innovations: there it is energy over stretches.
-    loud
+    stretch_energy
         What a mismatch adds up to over a stretch (see `gecar.reality.locate.misfit_energy`), in variances of noise,
         shape (groups of channels, recordings, spans).
     lengths
@@ -95,18 +95,18 @@ class MismatchMap:
         at = (index.channel, index.recording, np.minimum((index.t_s / BIN_S).astype(int), self.bins - 1))
         np.add.at(total, at, np.clip(errors, -CLIP, CLIP) ** 2 - 1.0)
         np.add.at(count, at, 1.0)
-        loud, seen = self._loud(before, moved, after, explained)
-        total[REFLECTION], count[REFLECTION] = loud[REFLECTION], seen[REFLECTION]
+        strong, seen = self._stretch_energy(before, moved, after, explained)
+        total[REFLECTION], count[REFLECTION] = strong[REFLECTION], seen[REFLECTION]
         self.masks, self.path = regime_masks(self.runs, before, self.bins, BIN_S)
         counts = np.ones(self.path.shape[:2], bool) if spot is None else _around(self.path, spot)
-        loud = loud * counts
+        strong = strong * counts
         self.energy = np.where((count > 0) & counts, total, 0.0)
         self.samples = count
         self._motion_explained, self.doubted, self.spot = explained[0], doubted, spot
-        spans = loud.reshape(*loud.shape[:2], -1, SPAN_BINS).sum(axis=3)
-        self.loud = np.stack([spans[group].sum(axis=0) for group in GROUPS])
+        spans = strong.reshape(*strong.shape[:2], -1, SPAN_BINS).sum(axis=3)
+        self.stretch_energy = np.stack([spans[group].sum(axis=0) for group in GROUPS])
 
-    def _loud(
+    def _stretch_energy(
         self, before: Physics, moved: Physics, after: Physics, explained: tuple[bool, bool]
     ) -> tuple[Array, Array]:
         """Return what a mismatch adds up to over a stretch, and the samples, by channel, recording and bin."""
@@ -122,7 +122,7 @@ class MismatchMap:
         return np.where(samples > 0, taken, 0.0), samples
 
     def places(self, rng: np.random.Generator) -> tuple[Place, ...]:
-        """Return where energy gathers more than chance lets it: the loudest sensor first, its most telling regime."""
+        """Return where energy gathers more than chance lets it: the strongest sensor first, its most telling regime."""
         excess = np.maximum(self.energy.sum(axis=(1, 2)), 0.0)
         mean = excess / np.maximum(self.samples.sum(axis=(1, 2)), 1.0)
         order = self._order()
@@ -140,19 +140,19 @@ class MismatchMap:
         return tuple(place for _, _, place in found[:MOST])
 
     def _order(self) -> list[int]:
-        """Return the groups of channels that were measured, the loudest first.
+        """Return the groups of channels that were measured, the strongest first.
 
         Where motion itself is not explained, nor is the path to be trusted: what was seen along it comes last.
         """
-        loud = self.loud.sum(axis=(1, 2))
+        strong = self.stretch_energy.sum(axis=(1, 2))
         if self.doubted or not self._motion_explained:
-            loud[READING_GROUP] = loud.min() - 1.0
+            strong[READING_GROUP] = strong.min() - 1.0
         if self.doubted:
-            loud[POSE_GROUP] = loud.max() + 1.0
-        if (loud <= 0.0).all():
-            loud = np.array([self.energy[group].sum() for group in GROUPS])
+            strong[POSE_GROUP] = strong.max() + 1.0
+        if (strong <= 0.0).all():
+            strong = np.array([self.energy[group].sum() for group in GROUPS])
         there = [k for k, group in enumerate(GROUPS) if self.samples[group].any()]
-        return sorted(there, key=lambda k: -loud[k])
+        return sorted(there, key=lambda k: -strong[k])
 
     def _regime(
         self, channel: int, name: str, mask: npt.NDArray[np.bool_], rng: np.random.Generator
@@ -179,30 +179,30 @@ class MismatchMap:
         share = float(self.energy[channel][mask].sum() / self.energy[channel].sum())
         if p > SIGNIFICANCE or share <= covered:
             return None
-        loud, spans = self._spans(channel)
-        name_of = self.runs[loud].recording.name
+        strong, spans = self._spans(channel)
+        name_of = self.runs[strong].recording.name
         entry = Place(CHANNELS[channel], name, round(min(share, 1.0), 3), p, spans, name_of, place)
         return float((share - covered) * np.sqrt(share)), entry
 
     def _spans(self, channel: int) -> tuple[int, tuple[tuple[float, float], ...]]:
-        """Return the recording in which a channel's sensor is loudest, and its loudest spans there."""
-        loud = np.maximum(self.loud[_GROUP[channel]], 0.0)
-        order = np.argsort(-loud, axis=None)
-        gathered = np.cumsum(loud.ravel()[order])
-        kept = np.zeros(loud.size, bool)
-        kept[order[: 1 + int(np.searchsorted(gathered, LOUDEST * gathered[-1]))]] = True
-        kept = kept.reshape(loud.shape)
-        loudest = int(np.argmax(np.where(kept, loud, 0.0).sum(axis=1)))
-        edges = np.flatnonzero(np.diff(np.r_[0, kept[loudest].astype(int), 0])) * SPAN_BINS * BIN_S
+        """Return the recording in which a channel's sensor is strongest, and its strongest spans there."""
+        strong = np.maximum(self.stretch_energy[_GROUP[channel]], 0.0)
+        order = np.argsort(-strong, axis=None)
+        gathered = np.cumsum(strong.ravel()[order])
+        kept = np.zeros(strong.size, bool)
+        kept[order[: 1 + int(np.searchsorted(gathered, STRONGEST * gathered[-1]))]] = True
+        kept = kept.reshape(strong.shape)
+        strongest = int(np.argmax(np.where(kept, strong, 0.0).sum(axis=1)))
+        edges = np.flatnonzero(np.diff(np.r_[0, kept[strongest].astype(int), 0])) * SPAN_BINS * BIN_S
         pairs = zip(edges[::2], edges[1::2], strict=True)
-        return loudest, tuple((round(float(a), 2), round(float(b), 2)) for a, b in pairs)
+        return strongest, tuple((round(float(a), 2), round(float(b), 2)) for a, b in pairs)
 
     def _throughout(self, channel: int) -> Place:
         """Return the entry of a channel that is off whatever the motion: the last resort."""
         count = self.samples[channel].sum()
         p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + DRAWS))
-        loud, spans = self._spans(channel)
-        name = self.runs[loud].recording.name
+        strong, spans = self._spans(channel)
+        name = self.runs[strong].recording.name
         if self.spot is None:
             return Place(CHANNELS[channel], "throughout", 1.0, round(p, 3), spans, name, None)
         return Place(CHANNELS[channel], ON_THE_FLOOR, 1.0, round(p, 3), spans, name, (*self.spot, SPOT_M))
@@ -220,5 +220,5 @@ class MismatchMap:
 def _around(path: Array, spot: tuple[float, float]) -> npt.NDArray[np.bool_]:
     """Return when a robot was near a spot or had just left it, shape (recordings, bins)."""
     near = np.hypot(path[:, :, 0] - spot[0], path[:, :, 1] - spot[1]) < SPOT_M
-    felt = np.ones(1 + round(SPOT_S / BIN_S))
-    return np.stack([np.convolve(row, felt)[: len(row)] > 0 for row in near])
+    lasting = np.ones(1 + round(SPOT_S / BIN_S))
+    return np.stack([np.convolve(row, lasting)[: len(row)] > 0 for row in near])

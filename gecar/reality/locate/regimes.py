@@ -14,7 +14,7 @@ from gecar.reality.residuals.of_recording import RecordingResiduals
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-AFTER_S = 0.4  # how long an event is felt
+AFTER_S = 0.4  # how long an event has an effect
 RESTING, SLOW_SHARE, FAST_SHARE = 0.15, 0.35, 0.7  # rad/s, and shares of the fastest shaft speed
 SMALL_DUTY, STEP = 0.25, 0.15
 TURNING, STRAIGHT = 1.5, 0.25  # rad/s
@@ -49,18 +49,18 @@ def _table(
     return {name: mask & there for name, mask in masks.items()}, path
 
 
-def _motions(rows: Array, duty: Array, felt: int) -> dict[str, Mask]:
-    """Return regimes that the motion and the commands themselves tell, by name; an event is felt for so many bins."""
+def _motions(rows: Array, duty: Array, lasting: int) -> dict[str, Mask]:
+    """Return regimes that the motion and the commands themselves tell, by name; an event lasts for so many bins."""
     left, right, yaw, ahead = (rows[:, k] for k in (LEFT_SPEED, RIGHT_SPEED, YAW_RATE, AHEAD))
     fastest = max(float(np.abs(rows[:, [LEFT_SPEED, RIGHT_SPEED]]).max()), 1e-9)
     speed = np.maximum(np.abs(left), np.abs(right))
     moving = speed > RESTING
     stepped = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1) > STEP
     return {
-        "from rest": _after(_risen(moving), felt),
-        "reversal": _after(_turned(left) | _turned(right), felt),
-        "change of command": _after(stepped, felt),
-        "steady": ~_after(stepped, felt) & moving,
+        "from rest": _after(_risen(moving), lasting),
+        "reversal": _after(_turned(left) | _turned(right), lasting),
+        "change of command": _after(stepped, lasting),
+        "steady": ~_after(stepped, lasting) & moving,
         "standing": ~moving,
         "slow": moving & (speed < SLOW_SHARE * fastest),
         "fast": speed > FAST_SHARE * fastest,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.noise.sensor_noise import Noise
+from gecar.reality.noise.sensor_noise import PATH_CAUTION, Noise
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.replay.replayer import Replayer, replayer_of
 from gecar.reality.residuals.of_case import Residuals
@@ -101,7 +101,10 @@ def _floors(held: Residuals) -> dict[str, float]:
     angle, battery, rate, place, heading = noise.sd
     paths = [run.nuisances.path for run in held.recordings if run.reads]
     deviations = [path.reading_sd for path in paths if path is not None]
-    reading = _rms(np.concatenate(deviations)) if deviations else noise.reflection_sd
+    own = noise.reflection_sd
+    # Fits take the path for less certain than it is; the floor is what it is.
+    variances = [own**2 + (sd**2 - own**2) / PATH_CAUTION**2 for sd in deviations]
+    reading = float(np.sqrt(np.nanmean(np.concatenate(variances)))) if variances else own
     return {
         "left_angle_rad": angle, "right_angle_rad": angle, "battery_v": battery, "yaw_rate_rad_s": rate,
         "x_m": place, "y_m": place, "heading_rad": heading, "reflection_pct": reading,

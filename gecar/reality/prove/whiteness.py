@@ -1,4 +1,4 @@
-"""Whether what is left could be noise: its structure against simulated recordings with nothing to find."""
+"""Whether what is left could be noise: its excess energy against simulated recordings with nothing to find."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every model is fitted beside, and what is never an effect: clocks, marks, starts and paths of one recording."""
+"""Nuisance parameters of one recording, fitted with every model and never an effect: clock, mark, start and path."""
 
 from __future__ import annotations
 

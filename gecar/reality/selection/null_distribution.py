@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 
 def largest_gains(estimator: Estimator, catalogue: Sequence[str], model: Model) -> Array:
-    """Return the largest gain of any effect beside a model's in every draw, shape (draws,)."""
+    """Return the largest gain of any effect on top of a model in every draw, shape (draws,)."""
     errors = model.errors
     w = np.sqrt(weights(errors))
     spans = int(estimator.blocks.spans.max()) + 1

@@ -1,4 +1,4 @@
-"""Whether effects gain on the recordings set aside, beside the others refitted without them."""
+"""Whether each effect gains on the recordings set aside, against the others refitted without it."""
 
 from __future__ import annotations
 
