@@ -23,7 +23,7 @@ Physics = npt.NDArray[Any]
 
 STRETCH_S = 2.0  # the longest that stays honest: over 12 s a fake friction closes what no effect explains
 LEAST_SAMPLES = 5
-CORRELATED = (2, 3, 4, 5, 6)  # channels whose noise lingers: all but encoders and reflection
+CORRELATED = (2, 3, 4, 5, 6)  # channels whose noise is correlated: all but encoders and reflection
 LARGEST_LASTING = 20.0  # noise that lasts longer than a bin
 
 
@@ -35,10 +35,10 @@ def misfit_energy(
     Parameters
     ----------
     run
-        The recording; its path is set where its colour sensor looks.
+        The recording; it has a path where its colour sensor read something.
     before, moved, after
         Physics records, shape (1,): of the robot as it was known, with what was found to move it, and with all that
-        was found. Motion is compared under the first and the last, sight, whose path the last two share, under these.
+        was found. Motion is compared under the first and the last; readings, along one path, under the last two.
     bins, bin_s
         How many bins, and their length [s].
     """

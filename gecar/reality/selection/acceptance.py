@@ -14,7 +14,6 @@ from gecar.reality.selection.thresholds import (
     LEAST_INVERSE,
     MAIN_SHARE,
     MORE_SHARE,
-    RUNNERS_UP,
     SIGNIFICANCE,
     STOPPED,
     WHOLE_SHARE,
@@ -24,6 +23,7 @@ from gecar.world.effects import BY_ID
 Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 AT_BOUND = 0.01  # coordinates
+RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
 
 
 def worthwhile(parameters: Parameters, z: Array, effect: str) -> bool:
@@ -53,7 +53,7 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     """Return the best steps of a stage that explain enough, with every effect of a size worth a name."""
     return [
         step
-        for step in stage[: int(RUNNERS_UP)]
+        for step in stage[:RUNNERS_UP]
         if all(is_worthwhile(step.model, effect) for effect in step.model.effects)
         and step.drop >= problem.limits.least_drop * problem.blocks
         and step.gain >= COMPETING * stage[0].gain

@@ -12,7 +12,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import costs, weights
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.thresholds import LEAST_INFORMATION, ONE_FOLD, WHOLLY_EXPLAINED
+from gecar.reality.selection.thresholds import NEGLIGIBLE, ONE_FOLD
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
@@ -33,12 +33,12 @@ def left_out_gains(estimator: Estimator, step: Step) -> Array:
     new, folds = step.model, estimator.blocks.folds
     gained = np.bincount(folds, costs(step.base.errors) - costs(new.errors))
     # What one recording alone shows can not be left out. Wholly explained it counts: an imitation leaves something.
-    alone = gained.max() > ONE_FOLD * step.gain and step.energy_after < WHOLLY_EXPLAINED * step.energy_before
+    alone = gained.max() > ONE_FOLD * step.gain and step.energy_after < NEGLIGIBLE * step.energy_before
     if alone or len(np.unique(folds)) < 2:
         return np.array([step.gain])
     if not BY_ID[step.effect].differentiable:  # no Newton step tells what it would be without a recording
         others = gained.sum() - gained
-        return np.where(others > LEAST_INFORMATION * gained.sum(), gained, np.minimum(gained, 0.0))
+        return np.where(others > NEGLIGIBLE * gained.sum(), gained, np.minimum(gained, 0.0))
     return _predicted_gains(estimator, step.base, new)
 
 
@@ -68,7 +68,7 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * errors[rows])
         # A parameter that this recording alone determines is not known without it: it stays neutral.
-        known = np.flatnonzero(np.diag(rest) > LEAST_INFORMATION * np.diag(normal))
+        known = np.flatnonzero(np.diag(rest) > NEGLIGIBLE * np.diag(normal))
         without = np.zeros(len(z))
         block = rest[np.ix_(known, known)]
         ridge = RIDGE * np.diag(np.maximum(np.diag(block), 1e-9))

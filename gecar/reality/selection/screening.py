@@ -22,14 +22,13 @@ from gecar.reality.selection.thresholds import (
     COMPETING,
     DOUBTFUL_FIT,
     NEGLIGIBLE,
-    REFITTED,
-    SCREENED,
     SEARCHED,
 )
 from gecar.world.effects import BY_ID, Search
 
 Array = npt.NDArray[np.float64]
 
+IMPROVED, REFITTED = 10, 5  # effects of a stage that are improved by two iterations, and fitted in full
 SHORT = 8  # generations of a first search
 FINALIST_SPREAD = 0.6  # of a parameter's search spread, for the second search
 DOUBTFUL_SPREAD = 1.5  # of a parameter's search spread, about a fit that leaves much
@@ -73,14 +72,14 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     trials.sort(key=lambda t: -t.promise)
     if not trials or trials[0].promise < NEGLIGIBLE * problem.blocks:
         return []
-    begun = [_improved(estimator, t) for t in trials[: int(SCREENED)]]
+    begun = [_improved(estimator, t) for t in trials[:IMPROVED]]
     begun.sort(key=lambda t: t.minimum.cost)
     # What is too small for a name may gain by imitating much; it must not shut the others out.
     named = [t.gain for t in begun if worthwhile(t.parameters, t.minimum.z, t.effect)]
     best = max(named, default=max(t.gain for t in begun))
     steps = [
         step_of(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
-        for t in begun[: int(REFITTED)]
+        for t in begun[:REFITTED]
         if t.gain >= NEGLIGIBLE * best
     ]
     steps.sort(key=lambda s: -s.gain)

@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.selection.acceptance import candidates, is_worthwhile, number_accepted, proved
+from gecar.reality.selection.acceptance import RUNNERS_UP, candidates, is_worthwhile, number_accepted, proved
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.model_tolerance import without_tolerated
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
 from gecar.reality.selection.thresholds import (
-    BEGINNINGS,
     CLOCKS_FIRST,
     CLOCKS_OVER_COMMON,
     COMPETING,
@@ -23,10 +22,11 @@ from gecar.reality.selection.thresholds import (
     MOST_EFFECTS,
     MOST_ON_BENCH,
     NEARLY_WHOLE,
-    RUNNERS_UP,
     UNEXPLAINED_SHARE,
 )
 from gecar.world.effects import BY_ID
+
+BEGINNINGS = 3  # effects of the first stage a chain may begin with
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,7 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
     if not (len(chain.steps) > 1 or (not chain.steps and chain.nearly)):
         return []
     rivals = [
-        step
-        for step in first[1 : int(BEGINNINGS)]
-        if step.worthwhile and step.gain > COMPETING * first[0].gain
+        step for step in first[1:BEGINNINGS] if step.worthwhile and step.gain > COMPETING * first[0].gain
     ]
     chains = [_forward(problem, [step]) for step in rivals]
     return [other for other in chains if other.with_clocks is None]
@@ -169,7 +167,7 @@ def _swapped_and_dropped(
     estimator, floor = problem.estimator, problem.limits.floor * problem.blocks
     # The null distribution of what is left at the end; earlier ones are of what was left then.
     steps, best, null = list(accepted), accepted[-1].model, accepted[-1].null_95
-    rivals = {step.effect: step for stage in tried for step in stage[: int(RUNNERS_UP)]}
+    rivals = {step.effect: step for stage in tried for step in stage[:RUNNERS_UP]}
     for number, step in enumerate(accepted if len(accepted) > 1 else ()):
         rest = [e for e in best.effects if e != step.effect]
         swap = _swapped(problem, best, rest, list(rivals.values()), best.cost - null)

@@ -29,15 +29,8 @@ _EMPTY = "81 cases of the 3D engine with nothing concealed"
 
 # -- Evidence
 SIGNIFICANCE = Threshold(0.05, "p-value below which something is taken for real", "convention")
-NULL_DRAWS = Threshold(500, "draws of the null distribution", "standard error of its 95 % quantile: 1 %")
 ONE_FOLD = Threshold(
     0.9, "share of a step's gain in one recording from which leaving that out tells nothing", "hand"
-)
-WHOLLY_EXPLAINED = Threshold(
-    0.02, "share of the excess energy a step may leave if one recording alone shows it", _EXAMINED
-)
-LEAST_INFORMATION = Threshold(
-    0.02, "share of all information on a parameter the other recordings must hold to predict one", "hand"
 )
 
 # -- Forward selection
@@ -45,14 +38,12 @@ MOST_EFFECTS = Threshold(4, "effects a robot on the floor is given", "hand")
 MOST_ON_BENCH = Threshold(
     7, "effects a motor on a bench is given: it is known to tenths of a percent", "hand"
 )
-BEGINNINGS = Threshold(3, "effects of the first stage a chain may begin with", "hand")
 COMPETING = Threshold(0.3, "share of the best gain below which an effect is no rival", "hand")
-NEGLIGIBLE = Threshold(0.02, "gain a block, or share of the best gain, not worth fitting", "hand")
-RUNNERS_UP = Threshold(
-    4, "effects of a stage that are judged, and tried in the place of what was taken", "hand"
+NEGLIGIBLE = Threshold(
+    0.02,
+    "gain a block, or share of a gain, of excess energy, of information on a parameter, that is as good as none",
+    "hand",
 )
-SCREENED = Threshold(10, "effects of a stage improved by two iterations", "hand")
-REFITTED = Threshold(5, "effects of a stage fitted in full", "hand")
 SEARCHED = Threshold(
     0.05, "share of the cost an effect must explain to be searched without derivatives", "hand"
 )
