@@ -41,7 +41,7 @@ def half_widths(estimator: Estimator, model: Model) -> Array:
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
     scores = np.stack([np.bincount(estimator.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
-    sandwich = np.diag(inverse @ (scores.T @ scores) @ inverse)
+    sandwich = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 0.0)
     leaps = []
     for k in np.unique(estimator.blocks.folds):
         rows = estimator.blocks.folds == k
@@ -57,13 +57,17 @@ def half_widths(estimator: Estimator, model: Model) -> Array:
 
 
 def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
-    """Whether no size of an effect has an interval that leaves its neutral value out."""
+    """Whether the interval of an effect's size holds its neutral value.
+
+    Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
+    what they gain together decides.
+    """
     sizes = [
         (spans[effect][c.parameter.label], c.value(0.0))
         for c in model.parameters.coordinates
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
-    return all(interval.low <= neutral <= interval.high for interval, neutral in sizes)
+    return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
 
 
 def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
