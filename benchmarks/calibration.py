@@ -28,9 +28,9 @@ from benchmarks.concealed.commands import SECONDS, line_follower, script
 from benchmarks.concealed.recording import Conditions, channels, noise, write_recording
 from benchmarks.concealed.robot import SHAFT_INERTIA, SUPPLY, TRACK_WIDTH, WHEEL_RADIUS, Concealed
 from benchmarks.concealed.truth import ROW_TICKS, Array, Truth, replayed
-from gecar.reality.calibration import calibrate
-from gecar.reality.constants import BY_NAME
-from gecar.reality.recording import read_case
+from gecar.reality.calibrate.calibration import calibrate
+from gecar.reality.calibrate.constants import BY_NAME
+from gecar.reality.recordings.recording import read_case
 
 RUNS = ("holds", "holds", "sines", "line", "line", "reversals")
 HELD = "run_6_reversals"

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from gecar.reality.discovery import discover
-from gecar.reality.recording import read_case
-from gecar.reality.replay import Film
+from gecar.reality.recordings.recording import read_case
+from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.verdict import Found, Verdict
 
 BESIDE = Path(__file__).parents[2] / "shared" / "recordings"
@@ -68,10 +68,10 @@ def rows(folder: Path) -> Iterator[str]:
 
 def windows_mm(verdict: Verdict) -> str:
     """Return the error of EMPS' position on what was not fitted [mm], whole and over stretches of a second."""
-    film = Film(verdict.evidence.held[0].recording)
-    errors = film.reel.measured[:, 0] - film.play(verdict.robot.physics)[0][:, 0]
+    replayer = replayer_of(verdict.evidence.held.recordings[0].recording)
+    errors = replayer.measured[:, 0] - replayer.play(verdict.robot.physics).rows[:, 0]
     seen = ~np.isnan(errors)
-    errors, second = errors[seen], film.t[seen].astype(int)
+    errors, second = errors[seen], replayer.t[seen].astype(int)
     begun = errors[np.unique(second, return_index=True)[1]]
     short = errors - begun[second - second[0]]
     return f"{1e3 * np.sqrt(np.mean(errors**2)):.1f} mm, over 1 s {1e3 * np.sqrt(np.mean(short**2)):.1f} mm"

@@ -27,7 +27,7 @@ from gecar.files import write_whole
 from gecar.language.program import parse_program
 from gecar.plots.course import draw_course
 from gecar.plots.style import BLUE, GREEN, headline, look, new_figure, save
-from gecar.reality.rough_search import rough_search
+from gecar.reality.optimisation.cma_es import cma_es
 from gecar.world.course import Course, list_courses, load_course
 from gecar.world.driving import _arrive, _tile_at, advance
 from gecar.world.interpreter import Floor
@@ -159,9 +159,9 @@ class Search:
             return np.column_stack([self._bends + moved[:, :2], sharp, early, ahead]).round(5)
 
         bounds = np.tile(FARTHEST, k)
-        best, least = rough_search(
+        best, least = cma_es(
             lambda numbers: self.drive(points(numbers))[0], np.zeros(4 * k), np.tile(SPREAD, k), (-bounds, bounds),
-            np.random.default_rng(seed), generations, wider, patience=60, mentioned=0.002,
+            np.random.default_rng(seed), generations, wider, patience=60, least_gain=0.002,
         )  # fmt: skip
         return least, points(best)
 

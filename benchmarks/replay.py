@@ -7,8 +7,8 @@ import time
 import numpy as np
 
 from gecar.language.program import parse_program
-from gecar.reality.recording import Recording, make_recording
-from gecar.reality.replay import Film
+from gecar.reality.recordings.recording import Recording, make_recording
+from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
@@ -49,11 +49,11 @@ def recorded() -> Recording:
 
 def replay_ms(recording: Recording, memory_s: float, repeats: int = 200) -> float:
     """Return the shortest time of many replays [ms]: other programs only ever make it longer."""
-    film, physics = Film(recording, memory_s=memory_s), load_robot("ev3").physics
+    replayer, physics = replayer_of(recording, memory_s=memory_s), load_robot("ev3").physics
     best = float("inf")
     for _ in range(repeats):
         start = time.perf_counter()
-        film.play(physics)
+        replayer.play(physics)
         best = min(best, time.perf_counter() - start)
     return 1e3 * best
 

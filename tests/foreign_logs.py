@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from gecar.reality.columns import COLUMNS
-from gecar.reality.importing.logs import ImportOptions, import_logs
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
 
 BRICK = (

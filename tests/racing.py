@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.reference_times import UNREACHED, Search
 from gecar.compiled import compiled
-from gecar.reality.rough_search import rough_search
+from gecar.reality.optimisation.cma_es import cma_es
 from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
 from gecar.world.course import Course
 from gecar.world.driving import advance
@@ -57,9 +57,9 @@ def farthest(robot: Robot, seed: int, seconds: float = 0.6, pieces: int = 5) -> 
 def _most(robot: Robot, which: int, seed: int, seconds: float, pieces: int) -> float:
     rng, one = np.random.default_rng(seed), np.ones(2 * pieces)
     found = [
-        rough_search(
+        cma_es(
             lambda v: -beyond_the_bound(robot, v.reshape(pieces, 2), seconds)[which],
-            np.tile(start, pieces), 0.5 * one, (-one, one), rng, generations=6, mentioned=1e-4,
+            np.tile(start, pieces), 0.5 * one, (-one, one), rng, generations=6, least_gain=1e-4,
         )[1]
         for start in ((1.0, 1.0), (1.0, -0.9), (-1.0, 0.0))
     ]  # fmt: skip

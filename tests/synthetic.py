@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gecar.reality.recording import make_recording
+from gecar.reality.recordings.recording import make_recording
 
 RADIUS, TRACK = 0.028, 0.120
 

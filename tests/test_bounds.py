@@ -14,7 +14,7 @@ from gecar.files import read_text
 from gecar.language.grammar import load_grammar, parse_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import parse_program
-from gecar.reality.recording import read_recording
+from gecar.reality.recordings.recording import read_recording
 from gecar.results.config import configure
 from gecar.results.folder import read_history
 from gecar.results.guard import read_table

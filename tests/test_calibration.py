@@ -9,11 +9,11 @@ from trials import SENSOR_FREE, trial, weak_robot
 from gecar.errors import InputError
 from gecar.plots.calibration import calibration_figure
 from gecar.plots.style import is_whole
-from gecar.reality.calibration import BLIND, calibrate
-from gecar.reality.camera import corrected
-from gecar.reality.constants import CONSTANTS, chosen, with_constants
-from gecar.reality.recording import Case, Recording, make_recording, read_case, write_recording
-from gecar.reality.setup import Setup
+from gecar.reality.calibrate.calibration import BLIND, calibrate
+from gecar.reality.calibrate.constants import CONSTANTS, chosen, with_constants
+from gecar.reality.recordings.camera_frame import corrected
+from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, write_recording
+from gecar.reality.recordings.setup import Setup
 from gecar.report.calibration import calibration_lines, calibration_table
 from gecar.world.robot import load_robot, read_robot
 
@@ -105,7 +105,7 @@ def test_a_constant_that_an_effect_holds_is_set_there():
 
 
 def filmed_askew(recording, mark, course):
-    """Return a recording whose camera's mark and frame are off, as `gecar.reality.camera` says."""
+    """Return a recording whose camera's mark and frame are off, as `gecar.reality.recordings.camera_frame` says."""
     (ahead, left, turn), (dx, dy, angle) = mark, course
     h = recording.heading_rad
     x = recording.x_m + ahead * np.cos(h) - left * np.sin(h)
@@ -170,6 +170,35 @@ def test_calibrate_writes_a_robot_that_loads(gecar, tmp_path):
     assert "battery.voltage" in ended.json["constants"]
     robot = read_robot(tmp_path / "new/robot.toml")
     assert robot.battery.voltage == pytest.approx(ended.json["constants"]["battery.voltage"]["value"])
+
+
+def test_constants_that_do_not_explain_the_misfit_are_told_and_discover_is_named():
+    """Viscous friction and a wide track, of which only the track is a constant that is fitted."""
+    robot = NOMINAL.with_effects(
+        {"viscous_friction": {"coefficient_nms": 0.003}, "track_width": {"scale": 1.06}}
+    )
+    recordings = tuple(
+        trial(f"run_{k}", robot, SENSOR_FREE.replace("60,40", f"{60 - 10 * k},{30 + 10 * k}"), seed=k)
+        for k in range(3)
+    )
+    result = calibrate(Case("p09", recordings), ["run_2"], names=["body.track_width"])
+    assert "left_angle_deg" in result.unexplained
+    assert "gecar discover" in "\n".join(calibration_lines(result))
+    assert calibrated().unexplained == calibrated().worse == ()
+
+
+def test_a_robot_file_of_a_bench_is_enough(tmp_path):
+    file = tmp_path / "motor.toml"
+    file.write_text(
+        "name = 'motor'\n[motor]\ntorque_constant = 0.3\nback_emf_constant = 0.46\nresistance = 6.8\n"
+        "inertia = 0.0025\ncoulomb_friction = 0.02\n[battery]\nvoltage = 7.0\nresistance = 0.0\n"
+        "[drive]\nduty_cap = 1.0\n"
+    )
+    runs = (
+        replace(bench(level), setup=replace(bench(level).setup, robot=str(file))) for level in (0.3, 0.6, 0.9)
+    )
+    result = calibrate(Case("bench", tuple(runs)), names=["battery.voltage"])
+    assert [f.constant.name for f in result.fitted] == ["battery.voltage"]
 
 
 def test_bad_input_is_one_line(gecar, tmp_path):

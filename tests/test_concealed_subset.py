@@ -12,7 +12,7 @@ from benchmarks.concealed.plan import read_label
 from benchmarks.concealed.runner import holdout_names
 from benchmarks.concealed.sightings import sight
 from gecar.reality.discovery import discover
-from gecar.reality.recording import read_case
+from gecar.reality.recordings.recording import read_case
 
 
 def examined(kind, effects, seed, out):

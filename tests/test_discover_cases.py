@@ -9,7 +9,7 @@ import pytest
 from command import Command
 from test_discovery import EV3, recorded
 
-from gecar.reality.recording import write_recording
+from gecar.reality.recordings.recording import write_recording
 
 
 def cases_on_a_bench(folder: Path) -> list[Path]:

@@ -11,8 +11,8 @@ import pytest
 from gecar.brick.export import TARGETS, Ports, export_program
 from gecar.errors import InputError
 from gecar.language.program import parse_program
-from gecar.reality.importing.logs import ImportOptions, import_logs
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+from gecar.reality.recordings.setup import Setup
 from gecar.world.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate

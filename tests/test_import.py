@@ -16,11 +16,11 @@ from foreign_logs import (
 from synthetic import drive
 
 from gecar.errors import InputError
-from gecar.reality.columns import COLUMNS
-from gecar.reality.importing.frame import Frame
-from gecar.reality.importing.meaning import guess_meanings, parse_said
-from gecar.reality.recording import read_recording, write_recording
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.importing.frame import Frame
+from gecar.reality.recordings.importing.meaning import guess_meanings, parse_said
+from gecar.reality.recordings.recording import read_recording, write_recording
+from gecar.reality.recordings.setup import Setup
 
 
 @pytest.fixture(scope="module")

@@ -17,12 +17,12 @@ from foreign_logs import (
 from synthetic import drive
 
 from gecar.errors import InputError
-from gecar.reality.columns import COLUMNS
-from gecar.reality.importing.clock import compare, estimate_offset
-from gecar.reality.importing.logs import ImportOptions, import_logs
-from gecar.reality.importing.track import Track, odometry
-from gecar.reality.recording import read_recording
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.importing.clock import compare, estimate_offset
+from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+from gecar.reality.recordings.importing.track import Track, odometry
+from gecar.reality.recordings.recording import read_recording
+from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
 
 

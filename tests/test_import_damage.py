@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from synthetic import drive
 
 from gecar.errors import InputError
-from gecar.reality.importing.logs import ImportOptions, import_logs
-from gecar.reality.recording import read_recording
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+from gecar.reality.recordings.recording import read_recording
+from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
 
 

@@ -10,17 +10,17 @@ import pytest
 from test_discovery import EV3, recorded, verdict_on
 
 from gecar.reality.discovery import discover
-from gecar.reality.loudness import loudness, typical
-from gecar.reality.noise import estimate_noise
-from gecar.reality.recording import Case, Recording
-from gecar.reality.strip import Strip
+from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.verdict import Verdict
 from gecar.world.course import load_course
 from gecar.world.robot import Robot
 
 
-def strip_of(recording: Recording) -> Strip:
-    return Strip(recording, estimate_noise([recording], EV3.physics, 1.0), 1.0, None)
+def strip_of(recording: Recording) -> RecordingResiduals:
+    return residuals_of(recording, estimate_noise([recording], EV3.physics, 1.0), 1.0, None)
 
 
 def found_in(robot: Robot, *missing: str) -> Verdict:
@@ -39,17 +39,19 @@ def test_a_stretch_s_start_is_a_nuisance_however_far_off() -> None:
         left_angle_rad=run.left_angle_rad + 40.0,
     )
     there, moved = (
-        loudness(strip_of(r), EV3.physics, EV3.physics, EV3.physics, 90, 0.1) for r in (run, turned)
+        misfit_energy(strip_of(r), EV3.physics, EV3.physics, EV3.physics, 90, 0.1) for r in (run, turned)
     )
     assert moved[0].sum(axis=1) == pytest.approx(there[0].sum(axis=1), rel=0.15)
     per_sample = there[0].sum(axis=1)[[0, 1, 4, 5, 6]] / there[2].sum(axis=1)[[0, 1, 4, 5, 6]]
     assert (per_sample < 1.5).all()
 
 
-def test_loudness_shows_the_sensor_and_the_time_of_what_went_wrong() -> None:
+def test_misfit_energy_shows_the_sensor_and_the_time_of_what_went_wrong() -> None:
     run = recorded(EV3, 1)
     pushed = run.heading_rad + np.where(run.t_s > 5.0, 0.2, 0.0)
-    before, _, samples, _ = loudness(strip_of(replace(run, heading_rad=pushed)), *(EV3.physics,) * 3, 80, 0.1)
+    before, _, samples, _ = misfit_energy(
+        strip_of(replace(run, heading_rad=pushed)), *(EV3.physics,) * 3, 80, 0.1
+    )
     excess = before - samples
     assert np.argmax(excess.sum(axis=1)) == 6
     assert excess[6, 40:60].sum() > 0.9 * excess[6].sum()
@@ -61,22 +63,22 @@ def test_lingering_noise_is_told_by_the_typical_bin_unless_something_is_unexplai
     sums, samples = np.zeros((8, 1, 600)), np.full((8, 1, 600), 20.0)
     sums[6] = lingering[0]
     sums[0] = lingering[1]
-    noise = typical(sums, samples, explained=True)
+    noise = noise_inflation(sums, samples, explained=True)
     assert noise[6] == 20.0  # at its most
     assert noise[0] == 1.0  # encoders do not linger
-    assert typical(sums, samples, explained=False)[6] == 6.0
+    assert noise_inflation(sums, samples, explained=False)[6] == 6.0
 
 
 def test_what_is_pointed_at_first_is_the_loudest_sensor_and_its_loudest_spans() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     where, first = verdict.evidence.where, verdict.located[0]
     assert first.channel in {"left_angle", "right_angle"}
-    assert int(np.argmax(where.loud.sum(axis=(1, 2)))) == 0
-    of = next(k for k, s in enumerate(where.strips) if s.recording.name == first.recording)
-    spans = np.zeros(where.loud.shape[2], bool)
+    assert int(np.argmax(where.stretch_energy.sum(axis=(1, 2)))) == 0
+    of = next(k for k, s in enumerate(where.runs) if s.recording.name == first.recording)
+    spans = np.zeros(where.stretch_energy.shape[2], bool)
     for start, end in first.times_s:
         spans[round(start / 0.2) : round(end / 0.2)] = True
-    assert where.loud[0, of, spans].min() >= where.loud[0, of, ~spans].max()
+    assert where.stretch_energy[0, of, spans].min() >= where.stretch_energy[0, of, ~spans].max()
 
 
 @pytest.mark.parametrize("missing", [(), ("left_angle_rad", "right_angle_rad")])
@@ -112,7 +114,7 @@ def seen_on_the_course(seed: int, robot: Robot) -> Recording:
     run = recorded(EV3, seed)
     run = replace(run, setup=replace(run.setup, course="paper"))
     run = replace(run, reflection_pct=np.zeros(len(run.t_s)))
-    strip = Strip(run, estimate_noise([run], EV3.physics, 1.0), 1.0, load_course("paper"))
-    strip.set_path(EV3.physics)
+    beside = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, load_course("paper"))
+    beside = beside.with_path(EV3.physics, np.ones(3))
     noise = np.random.default_rng(seed).normal(0.0, 0.8, len(run.t_s))
-    return replace(run, reflection_pct=np.clip(np.round(strip.readings(robot.physics) + noise), 0.0, 100.0))
+    return replace(run, reflection_pct=np.clip(np.round(beside.readings(robot.physics) + noise), 0.0, 100.0))

@@ -9,7 +9,7 @@ from benchmarks.paper_robot.trials import trials
 from benchmarks.paper_robot.twin import LONG_SIDE
 from gecar.errors import InputError
 from gecar.language.program import parse_program
-from gecar.reality.gap import gap
+from gecar.reality.compare.gap import gap
 from gecar.world.course import Pose, load_course
 from gecar.world.robot import list_robots, load_robot
 from gecar.world.rollout import Outcome, World, simulate

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gecar.errors import InputError
-from gecar.reality import csv_table
-from gecar.reality.columns import COLUMNS
-from gecar.reality.recording import make_recording, read_case, read_recording, write_recording
-from gecar.reality.setup import Setup
+from gecar.reality.recordings import csv_reader
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.recording import make_recording, read_case, read_recording, write_recording
+from gecar.reality.recordings.setup import Setup
 
 FLOOR = (
     "t_s,left_duty_pct,right_duty_pct,left_angle_deg,x_m\n0.0,50,-50,0,1.5\n0.01,50,-50,3,\n0.02,0,0,7,1.6\n"
@@ -132,7 +132,7 @@ def test_paths_are_meant_from_the_toml(tmp_path, write):
 
 
 def test_huge_file_is_refused_unread(write, monkeypatch):
-    monkeypatch.setattr(csv_table, "MOST_BYTES", 50)
+    monkeypatch.setattr(csv_reader, "MOST_BYTES", 50)
     with pytest.raises(InputError, match="expected at most 0 MB: cut it"):
         read_recording(write(FLOOR))
 

@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from gecar.reality.recording import Recording, make_recording
-from gecar.reality.replay import Film, replay
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.recording import Recording, make_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.replayer import replay, replayer_of
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")
@@ -22,7 +22,7 @@ def driven(
     t = np.arange(0.0, seconds, 0.01)
     columns = {"t_s": t, "left_duty_pct": left(t), "right_duty_pct": right(t)}
     blank = make_recording("made", columns, Setup(rig=rig, course="none"))
-    rows = Film(blank).play(robot.physics, np.array([1.0, 0.5, 0.3]))[0]
+    rows = replayer_of(blank).play(robot.physics, np.array([1.0, 0.5, 0.3]))[0]
     columns |= {"left_angle_deg": np.degrees(rows[:, 0]), "right_angle_deg": np.degrees(rows[:, 1])}
     columns |= {"x_m": rows[:, 4], "y_m": rows[:, 5], "heading_deg": np.degrees(rows[:, 6])}
     return make_recording("made", columns, Setup(rig=rig, course="none"))
@@ -86,10 +86,10 @@ def test_a_wheel_in_the_air_reaches_the_motors_free_speed() -> None:
 
 
 def test_twelve_seconds_replay_within_a_few_milliseconds() -> None:
-    film = Film(driven(waves, steps, 12.0))
+    replayer = replayer_of(driven(waves, steps, 12.0))
     physics = EV3.physics
-    film.play(physics)
+    replayer.play(physics)
     began = time.process_time()
     for _ in range(10):
-        film.play(physics)
+        replayer.play(physics)
     assert (time.process_time() - began) / 10 < 0.006  # 0.0007 on an idle core; this machine may be busy

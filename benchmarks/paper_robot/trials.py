@@ -15,8 +15,8 @@ from pathlib import Path
 from benchmarks.paper_robot.drives import FIG_6, PAPER_COURSE, moved
 from benchmarks.paper_robot.twin import LONG_SIDE, NOISE_PCT, PLACED_DEG, PLACED_M, TRIALS
 from gecar.language.program import parse_program
-from gecar.reality.recording import Recording, write_recording
-from gecar.reality.rehearsal import rehearsal
+from gecar.reality.recordings.recording import Recording, write_recording
+from gecar.reality.recordings.synthetic import rehearsal
 from gecar.world.course import Course, Pose
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate

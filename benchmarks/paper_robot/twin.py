@@ -87,7 +87,7 @@ class Bench:
 
 
 def correlation(one: dict[str, Floats], other: dict[str, Floats]) -> tuple[float, float]:
-    """Return the correlation of x and of y at equal times, as `gecar.reality.gap` defines it."""
+    """Return the correlation of x and of y at equal times, as `gecar.reality.compare.gap` defines it."""
     t = np.arange(0.0, min(one["t_s"][-1], other["t_s"][-1]) + 1e-9, 0.01)
     x, y = (
         float(np.corrcoef(*(np.interp(t, each["t_s"], each[axis]) for each in (one, other)))[0, 1])

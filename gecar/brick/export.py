@@ -158,7 +158,7 @@ def _sensor_words(sensors: Sequence[Sensor], ports: Ports) -> dict[str, str]:
 
 
 def _log_words(second: bool, with_light: bool) -> dict[str, str]:
-    """Return how the log is written: names as `gecar.reality.columns` has them."""
+    """Return how the log is written: names as `gecar.reality.recordings.columns` has them."""
     light = ['"reflection_pct"'] if with_light else []
     columns = [
         '"t_s"',

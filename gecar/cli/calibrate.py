@@ -45,8 +45,8 @@ def calibrate(
     import json
 
     from gecar.files import write_whole
-    from gecar.reality.calibration import calibrate as calibrate_case
-    from gecar.reality.recording import read_case
+    from gecar.reality.calibrate.calibration import calibrate as calibrate_case
+    from gecar.reality.recordings.recording import read_case
     from gecar.report.calibration import calibration_lines, calibration_table
     from gecar.world.robot import load_robot, write_robot
 

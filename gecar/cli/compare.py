@@ -13,8 +13,8 @@ from gecar.errors import expected
 
 if TYPE_CHECKING:
     from gecar.language.program import Program
-    from gecar.reality.gap import Gap
-    from gecar.reality.recording import Recording
+    from gecar.reality.compare.gap import Gap
+    from gecar.reality.recordings.recording import Recording
 
 FRAMES = ("start", "course")
 
@@ -50,7 +50,7 @@ def compare(
       gecar compare trials/ --program runs/evolve-001
       gecar compare trial_1.csv trial_2.csv --program best.txt --robot calibrated/robot.toml
     """
-    from gecar.reality.gap import gap
+    from gecar.reality.compare.gap import gap
     from gecar.report.gap import gap_lines, gap_table
     from gecar.world.course import load_course
     from gecar.world.robot import load_robot
@@ -74,7 +74,7 @@ def compare(
 
 def _read(places: list[Path]) -> list[Recording]:
     """Read recordings, and folders of them; they must have a motion on the floor to compare."""
-    from gecar.reality.recording import read_case, read_recording
+    from gecar.reality.recordings.recording import read_case, read_recording
 
     found: list[Recording] = []
     for place in places:

@@ -64,7 +64,7 @@ def discover(
       gecar evolve --robot verdicts/monday/robot.toml
     """
     from gecar.cli.discovering import Task, conclude, conclude_all, say, teller
-    from gecar.reality.recording import read_case
+    from gecar.reality.recordings.recording import read_case
     from gecar.search.executors import usable_cores
     from gecar.world.robot import load_robot
 

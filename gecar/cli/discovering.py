@@ -18,7 +18,7 @@ from gecar.cli.voice import Voice, plain
 from gecar.errors import InputError
 from gecar.files import write_whole
 from gecar.reality.discovery import discover
-from gecar.reality.recording import Case
+from gecar.reality.recordings.recording import Case
 from gecar.reality.verdict import Verdict
 from gecar.report.verdict import sentences
 from gecar.search.workplace import Workplace, perform_each

@@ -13,9 +13,9 @@ from gecar.cli.voice import JsonOption, Voice
 from gecar.errors import expected
 
 if TYPE_CHECKING:
-    from gecar.reality.importing.frame import Frame
-    from gecar.reality.importing.logs import Imported
-    from gecar.reality.setup import Setup
+    from gecar.reality.recordings.importing.frame import Frame
+    from gecar.reality.recordings.importing.logs import Imported
+    from gecar.reality.recordings.setup import Setup
 
 FILES, CAMERA, RUN = "What the files hold", "The camera", "What the recording is of"
 
@@ -122,9 +122,9 @@ def import_(
       gecar import log.csv camera.csv --origin 112,940 --mark 0.04,0 --out case/run_1.csv
       gecar import step.csv --bench --constant left_duty_pct=60
     """
-    from gecar.reality.importing.logs import ImportOptions, import_logs
-    from gecar.reality.importing.meaning import parse_said
-    from gecar.reality.recording import write_recording
+    from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+    from gecar.reality.recordings.importing.meaning import parse_said
+    from gecar.reality.recordings.recording import write_recording
     from gecar.world.robot import load_robot
 
     voice = Voice(as_json)
@@ -183,7 +183,7 @@ def _tell(voice: Voice, imported: Imported, target: Path) -> None:
 def _setup(robot: str, course: str, bench: bool, program: Path | None, notes: str) -> Setup:
     """Return what goes into the recording's TOML; files of one's own become absolute paths."""
     from gecar.language.program import read_program
-    from gecar.reality.setup import Setup
+    from gecar.reality.recordings.setup import Setup
     from gecar.world.course import load_course
 
     if course != "none":
@@ -202,7 +202,7 @@ def _frame(
     heading_zero: float | None, mark: str, start_of: str | None,
 ) -> Frame:  # fmt: skip
     """Return the camera's frame; ``start_of`` is the course whose START the path begins at."""
-    from gecar.reality.importing.frame import Frame
+    from gecar.reality.recordings.importing.frame import Frame
     from gecar.world.course import load_course
 
     if scale is not None and not 0.0 < scale < math.inf:
@@ -250,7 +250,7 @@ def _pair(option: str, text: str) -> tuple[float, float]:
 
 def _constants(texts: Sequence[str]) -> dict[str, float]:
     """Read ``COLUMN=VALUE`` options."""
-    from gecar.reality.columns import COLUMNS
+    from gecar.reality.recordings.columns import COLUMNS
 
     constants = {}
     for text in texts:

@@ -188,8 +188,8 @@ def _record(
     """Keep the drive as a recording if that is wanted."""
     if target is None:
         return {}
-    from gecar.reality.recording import write_recording
-    from gecar.reality.rehearsal import rehearsal
+    from gecar.reality.recordings.recording import write_recording
+    from gecar.reality.recordings.synthetic import rehearsal
 
     target.parent.mkdir(parents=True, exist_ok=True)
     place = str(Path(course).resolve()) if course and Path(course).is_file() else ""

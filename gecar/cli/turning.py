@@ -11,8 +11,8 @@ from gecar.cli.voice import Voice
 from gecar.errors import expected
 from gecar.plots.motor import Curve, motor_speed
 from gecar.plots.style import picture_kind, save
-from gecar.reality.recording import read_recording
-from gecar.reality.steady_speed import steady_speeds
+from gecar.reality.recordings.bench_speed import steady_speeds
+from gecar.reality.recordings.recording import read_recording
 from gecar.report.motor import Speeds, motor_table
 from gecar.world.robot import Robot, load_robot
 from gecar.world.shaft_speed import altered, settled_speeds

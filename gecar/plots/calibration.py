@@ -20,8 +20,8 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
-from gecar.reality.calibration import Calibration, Fitted, Unknown
-from gecar.reality.identifiable import BLIND
+from gecar.reality.calibrate.calibration import Calibration, FittedConstant, UnknownConstant
+from gecar.reality.calibrate.identifiability import BLIND
 
 ROW_IN = 0.27
 _POSE = ("x_m", "y_m", "heading_deg")
@@ -46,7 +46,7 @@ def calibration_figure(result: Calibration) -> Figure:
     return figure
 
 
-def _doubtful(result: Calibration) -> list[Unknown]:
+def _doubtful(result: Calibration) -> list[UnknownConstant]:
     """Return what the recordings feel, but do not tell."""
     return [unknown for unknown in result.unknown if unknown.why != BLIND]
 
@@ -108,7 +108,7 @@ def _mean(columns: object) -> tuple[float, float] | None:
     return max(before, 1e-5), max(after, 1e-5)
 
 
-def _steps(fitted: Fitted, value: float) -> float:
+def _steps(fitted: FittedConstant, value: float) -> float:
     return (value - fitted.nominal) / fitted.constant.step
 
 

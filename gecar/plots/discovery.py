@@ -28,8 +28,9 @@ from gecar.plots.style import (
     new_figure,
 )
 from gecar.reality.evidence import Evidence
-from gecar.reality.loudness import STRETCH_S, stretch_errors
-from gecar.reality.strip import CHANNELS, Strip
+from gecar.reality.locate.misfit_energy import STRETCH_S, stretch_errors
+from gecar.reality.replay.channels import CHANNELS
+from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.verdict import Place, Verdict
 from gecar.world.course import load_course
 
@@ -65,7 +66,7 @@ def verdict_drawings(verdict: Verdict) -> dict[str, Callable[[Verdict], Figure]]
         "traces": traces_figure,
         "tried": tried_figure,
     }
-    if any(len(strip.film.reel.pose_t) for strip in verdict.evidence.strips):
+    if any(run.replayer.has_poses for run in verdict.evidence.fitted.recordings):
         drawings["map"] = map_figure
     return drawings
 
@@ -128,7 +129,7 @@ def _density(where: object, channel: int, mask: npt.NDArray[np.bool_]) -> float:
 def tried_figure(verdict: Verdict) -> Figure:
     """Draw what each effect refitted would gain, stage by stage, beside the null."""
     evidence: Evidence = verdict.evidence
-    stages = [*evidence.moved.tried, *(evidence.seen.tried if evidence.seen else ())]
+    stages = [*evidence.motion.tried, *(evidence.sensing.tried if evidence.sensing else ())]
     stages = [s for s in stages if s][:4]
     figure = new_figure(8.0, 2.0 + 1.5 * max(len(stages), 1))
     taken = {found.id: found.null_95 for found in verdict.effects}
@@ -154,12 +155,12 @@ def traces_figure(verdict: Verdict) -> Figure:
     """Draw what replays of short stretches leave in the recording where mismatch shows most, its spans marked."""
     evidence: Evidence = verdict.evidence
     place = verdict.located[0] if verdict.located else None
-    strip = next(
-        (s for s in evidence.strips if place and s.recording.name == place.recording), evidence.strips[0]
+    run = next(
+        (s for s in evidence.fitted.recordings if place and s.recording.name == place.recording),
+        evidence.fitted.recordings[0],
     )
-    taken = evidence.moved.taken
-    before = _traces(strip, evidence.before.physics, taken.freedom.physics(taken.fit.z))
-    after = _traces(strip, verdict.robot.physics, verdict.robot.physics)
+    before = _traces(run, evidence.before.physics, evidence.motion.taken.physics)
+    after = _traces(run, verdict.robot.physics, verdict.robot.physics)
     loudest = f"; shaded: where {place.channel.replace('_', ' ')} is loudest" if place else ""
     pointed = {p.channel for p in verdict.located}
     seen = [name for name in before if _SHOWN[name][2] or name in pointed]
@@ -168,9 +169,9 @@ def traces_figure(verdict: Verdict) -> Figure:
         for number, name in enumerate(seen):
             axes = figure.add_subplot(len(seen), 1, number + 1)
             _mark(axes, place)
-            for run, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
-                axes.plot(*run[name], color=colour, linewidth=0.9, label=label)
-            axes.set(ylabel=_SHOWN[name][0], xlim=(0, strip.film.t[-1]))
+            for traces, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
+                axes.plot(*traces[name], color=colour, linewidth=0.9, label=label)
+            axes.set(ylabel=_SHOWN[name][0], xlim=(0, run.replayer.t[-1]))
             axes.tick_params(labelbottom=name == seen[-1])
             if number == 0:
                 axes.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
@@ -178,24 +179,24 @@ def traces_figure(verdict: Verdict) -> Figure:
             axes.set_xlabel("time [s]")
         headline(
             figure,
-            f"Measured less simulated, in {strip.recording.name}",
+            f"Measured less simulated, in {run.recording.name}",
             f"replays of {STRETCH_S:g} s, each from where the robot was" + loudest,
         )
     return figure
 
 
-def _traces(strip: Strip, motion: Physics, sight: Physics) -> dict[str, tuple[Array, Array]]:
+def _traces(run: RecordingResiduals, motion: Physics, sight: Physics) -> dict[str, tuple[Array, Array]]:
     """Return times and errors by channel, in the units shown; stretches are parted by a gap."""
-    sd = strip.film.reel.sd[[0, 0, 1, 2, 3, 3, 4]]
+    sd = run.replayer.inputs.sd[[0, 0, 1, 2, 3, 3, 4]]
     out = {}
-    for channel, t, errors in stretch_errors(strip, motion):
+    for channel, t, errors in stretch_errors(run, motion):
         if len(t):
             name = CHANNELS[channel]
             cuts = 1 + np.flatnonzero(np.diff((t / STRETCH_S).astype(int)))
             values = _SHOWN[name][1] * sd[channel] * errors
             out[name] = (np.insert(t, cuts, np.nan), np.insert(values, cuts, np.nan))
-    if strip.looks:
-        out["reflection"] = (strip.film.t, strip.recording.reflection_pct - strip.readings(sight))
+    if run.reads:
+        out["reflection"] = (run.replayer.t, run.recording.reflection_pct - run.readings(sight))
     return out
 
 
@@ -209,7 +210,7 @@ def map_figure(verdict: Verdict) -> Figure:
     evidence: Evidence = verdict.evidence
     where = evidence.where
     energy = np.maximum(where.energy[[0, 1, 4, 5, 6]].sum(axis=0), 0.0)
-    setup = evidence.strips[0].recording.setup
+    setup = evidence.fitted.recordings[0].recording.setup
     figure = new_figure(9.0, 5.6)
     with look():
         axes = figure.add_subplot()

@@ -27,7 +27,7 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
-from gecar.reality.gap import CHANNELS, Gap, Path, Trial
+from gecar.reality.compare.gap import CHANNELS, Gap, Path, Trial
 from gecar.world.rollout import Outcome
 
 TRIAL_COLOURS = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)

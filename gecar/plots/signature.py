@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from gecar.plots.course import draw_course
 from gecar.plots.style import BLUE, ORANGE, SOFT, VERMILION, headline, look, new_figure
-from gecar.reality.following import HEADING, LEFT_ANGLE, LEFT_SPEED, RIGHT_ANGLE, X, Y
-from gecar.reality.freedom import free
-from gecar.reality.looking import look_along
-from gecar.reality.recording import make_recording
-from gecar.reality.replay import Film
-from gecar.reality.setup import Setup
+from gecar.reality.fitting.parameters import free
+from gecar.reality.recordings.recording import make_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, LEFT_SPEED, RIGHT_ANGLE, X, Y
+from gecar.reality.replay.reflectance import readings_along
+from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course import Course
 from gecar.world.effects import BY_ID, Effect
 from gecar.world.robot import Robot
@@ -62,7 +62,7 @@ SHOWN: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class _Drive:
-    """What robot and sensors did: times [s], rows as `gecar.reality.following` lists them, and reflection [%]."""
+    """What robot and sensors did: times [s], rows as `gecar.reality.replay.kernel` lists them, and reflection [%]."""
 
     t: Array
     rows: Array
@@ -113,12 +113,12 @@ def _driven(robot: Robot, course: Course) -> _Drive:
     frames = {"x_m": START[0], "y_m": START[1], "heading_deg": 90.0}
     columns = {"t_s": t, "left_duty_pct": duty[:, 0], "right_duty_pct": duty[:, 1]}
     columns |= {name: np.full(len(t), value) for name, value in frames.items()}
-    film = Film(make_recording("signature", columns, Setup(course="none", duty_cap=1.0)))
-    rows, _, poses, _ = film.play(robot.physics, START)
+    replayer = replayer_of(make_recording("signature", columns, Setup(course="none", duty_cap=1.0)))
+    rows, _, poses, _ = replayer.play(robot.physics, START)
     reflection = np.empty(len(t))
     path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
-    look_along(
-        film.t,
+    readings_along(
+        replayer.t,
         path,
         0.0,
         QUIET_PCT,
@@ -129,7 +129,7 @@ def _driven(robot: Robot, course: Course) -> _Drive:
         reflection,
     )
     rows[:, [X, Y, HEADING]] = poses  # what a camera sees: late, where poses are
-    return _Drive(film.t, rows, reflection)
+    return _Drive(replayer.t, rows, reflection)
 
 
 def _draw_traces(traces: list[Axes], without: _Drive, with_it: _Drive, sight: bool) -> None:

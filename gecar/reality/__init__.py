@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gecar.reality.discovery import discover
-    from gecar.reality.recording import Case, Recording, make_recording, read_case, read_recording
+    from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, read_recording
     from gecar.reality.verdict import Verdict
 
 _HOMES = {
-    "discover": "discovery", "Case": "recording", "Recording": "recording", "make_recording": "recording",
-    "read_case": "recording", "read_recording": "recording", "Verdict": "verdict",
+    "discover": "discovery", "Verdict": "verdict",
+    "Case": "recordings.recording", "Recording": "recordings.recording", "make_recording": "recordings.recording",
+    "read_case": "recordings.recording", "read_recording": "recordings.recording",
 }  # fmt: skip
 
 __all__ = [

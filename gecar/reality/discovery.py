@@ -6,59 +6,56 @@ print(verdict)
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.alignment import fitted_offsets
-from gecar.reality.chain import Explanation, explain
-from gecar.reality.comparison import Comparison
-from gecar.reality.confusion import alternatives
-from gecar.reality.described import with_formulas
+from gecar.reality.advise.next_recording import suggest
+from gecar.reality.advise.notes import notes_on
 from gecar.reality.evidence import Evidence
-from gecar.reality.fitting import cost
-from gecar.reality.formula import Formula, describe
-from gecar.reality.holdout import Misfit, Split, judge, split
-from gecar.reality.known_robot import known_robot
-from gecar.reality.levels import levelled
-from gecar.reality.limits import SIGHT, SIGHT_ON_A_DOUBTFUL_PATH
-from gecar.reality.location import Map
-from gecar.reality.next_recording import suggest
-from gecar.reality.noise import Noise, estimate_noise
-from gecar.reality.path_doubt import path_in_doubt
-from gecar.reality.recording import Case, Recording
-from gecar.reality.remarks import remarks
-from gecar.reality.selection import Selection
-from gecar.reality.strip import Strip
-from gecar.reality.uncertainty import intervals
-from gecar.reality.verdict import Found, Judgement, Residual, Verdict
-from gecar.reality.visible import visible, visible_to_sight
-from gecar.reality.whiteness import whiteness
-from gecar.world.course import Course, load_course
+from gecar.reality.fitting.clock_offsets import with_fitted_clocks
+from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
+from gecar.reality.invent.corrected_replay import with_formulas
+from gecar.reality.invent.formula import Formula, describe
+from gecar.reality.locate.hotspot import hotspot
+from gecar.reality.locate.mismatch_map import MismatchMap
+from gecar.reality.locate.path_check import path_in_doubt
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
+from gecar.reality.prove.holdout import Contender, judge
+from gecar.reality.prove.whiteness import whiteness
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.recordings.recording import Case
+from gecar.reality.recordings.split import Split, hold_out
+from gecar.reality.replay.channels import POSE
+from gecar.reality.residuals.of_case import Residuals, motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.alternatives import alternatives
+from gecar.reality.selection.observability import observable
+from gecar.reality.selection.problem import problem_of
+from gecar.reality.selection.stepwise import Explanation, explain
+from gecar.reality.selection.thresholds import MOTION, SENSOR, SENSOR_ON_A_DOUBTFUL_PATH, SIGNIFICANCE
+from gecar.reality.uncertainty.intervals import contains_neutral, intervals
+from gecar.reality.verdict import Found, Interval, Judgement, Misfit, Residual, Verdict
+from gecar.world.effects import CATALOGUE, Effect
 from gecar.world.robot import Robot
 
-Array = npt.NDArray[np.float64]
-
-MEMORY_S = 1.0
-POSES = (4, 5, 6)  # channels of the pose
+MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 
 
-@dataclass
-class _Workshop:
-    """What all stages of one discovery share."""
+@dataclass(frozen=True)
+class _Context:
+    """What all stages share: the robot as it is known, what may be found, and how."""
 
     robot: Robot
+    catalogue: tuple[Effect, ...]
     split: Split
-    noise: Noise
-    strips: list[Strip]
-    held: list[Strip]
-    pool: ThreadPoolExecutor
-    tell: Callable[[str], None]
     seed: int
+    tell: Callable[[str], None]
+    with_formula: bool
 
 
 def discover(
@@ -69,8 +66,9 @@ def discover(
     workers: int | None = None,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
     with_formula: bool = False,
+    catalogue: Sequence[Effect] = CATALOGUE,
 ) -> Verdict:
-    """Find which physics a simulation lacks, fit it, and prove it on recordings set aside.
+    """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
 
     Parameters
     ----------
@@ -81,204 +79,189 @@ def discover(
     robot
         The robot as it is known; default: what the recordings name.
     seed
-        Of every draw of chance.
+        Random seed.
     workers
-        Threads; default: all cores.
+        Threads; default: one a core.
     tell
         Called with a line of progress.
     with_formula
         Whether to add a formula for what nothing explains to the replays, and to judge what that gains.
+    catalogue
+        The effects that may be found.
 
     Raises
     ------
     InputError
         If a name is unknown, or a robot or course file is wrong.
     """
-    shop = _open(case, holdout, robot, seed, workers, tell)
-    tell(f"fitting on {', '.join(r.name for r in shop.split.fitted)}")
-    motion, moved, colour = _move(shop)
-    sight, seen = _look(shop, moved, colour)
-    found_robot = shop.robot.with_effects({**moved.taken.values, **(seen.taken.values if seen else {})})
-    tell("intervals, alternatives, whereabouts")
-    judgement = _judge(shop, motion, found_robot, colour)
-    found, rivals = _found(shop, motion, moved, found_robot)
-    if sight and seen:
-        more, others = _found(shop, sight, seen, found_robot)
-        found, rivals = found + more, rivals + others
-    unexplained = moved.unexplained or bool(seen and seen.unexplained)
-    doubted = bool(seen and seen.unexplained) and path_in_doubt(shop.strips, found_robot.physics)
-    where = _map(shop, found_robot, motion, moved, seen, doubted)
-    word = _word(bool(found), unexplained)
+    known = robot if robot is not None else known_robot(case.recordings[0])
+    context = _Context(known, tuple(catalogue), hold_out(case, holdout), seed, tell, with_formula)
+    with Threads(workers) as threads:
+        return _discover(case.name, context, threads)
+
+
+def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
+    """Return the verdict, stage by stage."""
+    split, known = context.split, context.robot
+    context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
+    noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
+    fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
+    motion = _explain_motion(context, fitted, held)
+    fitted = _along_paths(
+        motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
+    )
+    sensing = _explain_sensor(context, motion.explained, fitted, held)
+    stages = [stage for stage in (motion, sensing) if stage]
+    found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
+    before, after = (
+        Contender(robot, _with_nuisances(held, motion.explained, robot.physics)) for robot in (known, found)
+    )
+    context.tell("alternatives, location")
+    effects, rivals = _findings(known, stages)
+    unexplained = any(stage.explained.unexplained for stage in stages)
+    word = _word(bool(effects), unexplained)
+    where = _located(context, stages, fitted, found)
     return Verdict(
-        case=case.name,
+        case=name,
         verdict=word,
-        effects=found,
-        located=where.places(np.random.default_rng(seed)) if word != "nothing" else (),
-        judgement=judgement,
-        residual=_left(shop, motion, moved, found_robot, unexplained, with_formula),
-        next_recording=suggest(found_robot, found, rivals, shop.split.fitted[0], shop.noise, unexplained),
-        robot=found_robot.model_copy(update={"name": f"{shop.robot.name}-{case.name}"}),
-        fitted_on=tuple(r.name for r in shop.split.fitted),
-        notes=remarks(shop.split, shop.strips, motion, doubted),
+        effects=effects,
+        located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
+        judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
+        residual=_what_is_left(context, stages, fitted, after),
+        next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
+        robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
+        fitted_on=tuple(r.name for r in split.fitted),
+        notes=notes_on(
+            split,
+            fitted,
+            motion.explained.problem.clocks_fitted,
+            where.doubted,
+            [step.effect for stage in stages for step in stage.candidates],
+        ),
         evidence=Evidence(
-            motion, moved, sight, seen, where, tuple(shop.strips), tuple(shop.held), shop.robot
+            motion.explained, sensing.explained if sensing else None, where, fitted, after.held, known
         ),
     )
+
+
+@dataclass(frozen=True)
+class _Stage(Confirmation):
+    """What was explained and confirmed, with the 95 % intervals of its parameters by effect and label."""
+
+    spans: Mapping[str, Mapping[str, Interval]]
+
+
+def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
+    """Explain how the robot moved; what is left at one place of the floor counts where nothing else is."""
+    catalogue = observable(context.catalogue, fitted)
+    problem = problem_of(fitted, context.robot, catalogue, MOTION, context.seed, context.tell)
+    motion = _with_intervals(context, confirmed(explain(problem), held))
+    explained = motion.explained
+    if explained.unexplained or explained.steps:
+        return motion
+    spot = hotspot(explained.problem, explained.left)
+    return replace(motion, explained=replace(explained, unexplained=spot is not None, spot=spot))
+
+
+def _explain_sensor(
+    context: _Context, motion: Explanation, fitted: Residuals, held: Residuals
+) -> _Stage | None:
+    """Explain what the colour sensor read along the measured path; None where it read nothing."""
+    residuals = fitted.of_sensor()
+    if not residuals.recordings:
+        return None
+    # A late camera and a skewed clock shift what is read, too.
+    known = context.robot.with_effects(motion.taken.values)
+    limits = SENSOR_ON_A_DOUBTFUL_PATH if motion.unexplained else SENSOR
+    catalogue = observable(context.catalogue, residuals)
+    problem = problem_of(residuals, known, catalogue, limits, context.seed, context.tell)
+    seen = confirmed(explain(problem), _with_nuisances(held, motion, motion.taken.physics).of_sensor())
+    taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
+    return _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
+
+
+def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
+    """Return the recordings set aside with the nuisances of those fitted on, fitted anew under a robot's physics."""
+    clocked = with_fitted_clocks(held, physics)[0] if motion.problem.clocks_fitted else held
+    return _along_paths(clocked, motion, physics)
+
+
+def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
+    """Return recordings with the path their colour sensor took, as a robot's physics gives it."""
+    inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
+    return residuals.localised(physics).with_paths(physics, inflation)
+
+
+def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
+    """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate."""
+    explained, candidates = confirmation.explained, confirmation.candidates
+    context.tell("intervals")
+    while True:
+        spans = intervals(explained.problem.estimator, explained.taken, context.seed)
+        absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
+        if not absent:
+            return _Stage(explained, candidates, spans)
+        weakest = min(absent, key=lambda step: step.gain)
+        explained, candidates = dropped(explained, weakest), (*candidates, weakest)
+
+
+def _findings(known: Robot, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
+    """Return what was found, and robots with an alternative in its place."""
+    found, rivals = list[Found](), list[Robot]()
+    for stage in stages:
+        beside = {
+            effect: values
+            for other in stages
+            if other is not stage
+            for effect, values in other.explained.taken.values.items()
+        }
+        for step in stage.explained.steps:
+            others = alternatives(stage.explained, step)
+            rivals += [known.with_effects({**beside, **model.values}) for model in others.values()]
+            gain, null = step.holdout_gain, step.null_95
+            found.append(Found(step.effect, tuple(others), stage.spans[step.effect], gain, null, step.p))
+    return tuple(found), tuple(rivals)
+
+
+def _located(context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Robot) -> MismatchMap:
+    """Return where simulation and reality part."""
+    motion = stages[0].explained
+    sensor_unexplained = any(stage.explained.unexplained for stage in stages[1:])
+    return MismatchMap(
+        fitted.recordings,
+        motion.problem.known.errors,
+        motion.problem.residuals.index,
+        context.robot.physics,
+        motion.taken.physics,
+        found.physics,
+        (not motion.unexplained, not sensor_unexplained),
+        sensor_unexplained and path_in_doubt(fitted.recordings, found.physics),
+        motion.spot,
+    )
+
+
+def _what_is_left(
+    context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Contender
+) -> Residual:
+    """Return whether what is left is white, and formulas for what nothing explains."""
+    parts = [stage.explained for stage in stages]
+    # Of motion and readings, the smaller p-value counts, times their number (Bonferroni).
+    p = min(1.0, len(parts) * min(whiteness(each.problem, each.taken, context.seed)[1] for each in parts))
+    motion, described = parts[0], tuple[Formula, ...]()
+    if motion.unexplained:
+        described = describe(fitted.recordings, motion.taken.physics, context.seed)
+    gained = _with_formulas(found, described) if context.with_formula and described else None
+    white = p > SIGNIFICANCE and not any(each.unexplained for each in parts)
+    return Residual(white, p, "; ".join(map(str, described)) or None, gained)
+
+
+def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, Misfit]:
+    """Judge what formulas added to the robot found gain on the recordings set aside."""
+    misfits = judge(found, replace(found, correction=with_formulas(formulas)))
+    return {column: m for column, m in misfits.items() if m.before != m.after}
 
 
 def _word(named: bool, unexplained: bool) -> str:
     if named:
         return "missing_and_unexplained" if unexplained else "missing"
     return "unexplained" if unexplained else "nothing"
-
-
-def _open(
-    case: Case,
-    holdout: Sequence[str],
-    robot: Robot | None,
-    seed: int,
-    workers: int | None,
-    tell: Callable[[str], None],
-) -> _Workshop:
-    parts = split(case, holdout)
-    known = robot if robot is not None else known_robot(case.recordings[0])
-    noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
-    courses: dict[str, Course | None] = {}
-
-    def strip(recording: Recording) -> Strip:
-        name = recording.setup.course
-        if name not in courses:
-            needed = recording.setup.rig == "floor" and name != "none"
-            courses[name] = load_course(name) if needed else None
-        return Strip(recording, noise, MEMORY_S, courses[name])
-
-    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
-    return _Workshop(
-        known,
-        parts,
-        noise,
-        [strip(r) for r in parts.fitted],
-        [strip(r) for r in parts.held],
-        pool,
-        tell,
-        seed,
-    )
-
-
-def _move(shop: _Workshop) -> tuple[Selection, Explanation, Array]:
-    """Explain how the robot moved; with it, by how much slow noise exceeds white noise in the pose, shape (3,)."""
-    comparison = Comparison(shop.strips, False, shop.pool)
-    selection = Selection(
-        comparison, shop.robot, visible(shop.strips), shop.split.fitted, shop.seed, shop.tell
-    )
-    moved = explain(selection)
-    left = selection.rid_of_subtle(moved.taken).fit.errors
-    return selection, moved, selection.blocks.colour(left)[list(POSES)]
-
-
-def _look(shop: _Workshop, moved: Explanation, colour: Array) -> tuple[Selection | None, Explanation | None]:
-    """Explain what the colour sensor saw along the measured path."""
-    mover = moved.taken.freedom.physics(moved.taken.fit.z)
-    list(shop.pool.map(lambda strip: strip.locate(mover), shop.strips))
-    comparison = Comparison(shop.strips, True, shop.pool)
-    if not comparison.strips:
-        return None, None
-    comparison.set_path(mover, colour)
-    known = shop.robot.with_effects(
-        moved.taken.values
-    )  # a late camera, a skewed clock shift what is seen, too
-    selection = Selection(
-        comparison,
-        known,
-        visible_to_sight(comparison.strips),
-        shop.split.fitted,
-        shop.seed,
-        shop.tell,
-        SIGHT_ON_A_DOUBTFUL_PATH if moved.unexplained else SIGHT,
-    )
-    seen = explain(selection)
-    return selection, replace(seen, taken=levelled(selection, seen.taken))
-
-
-def _judge(shop: _Workshop, motion: Selection, found: Robot, colour: Array) -> Judgement:
-    if motion.clocked:
-        _set_clocks(shop, found)
-    list(shop.pool.map(lambda strip: strip.locate(found.physics), shop.held))
-    sight = Comparison(shop.held, True, shop.pool)
-    sight.set_path(found.physics, colour)
-    channels = judge(shop.split.held, shop.held, shop.noise, shop.robot, found)
-    return Judgement(tuple(r.name for r in shop.split.held), shop.split.by_time, channels)
-
-
-def _left(
-    shop: _Workshop,
-    motion: Selection,
-    moved: Explanation,
-    found: Robot,
-    unexplained: bool,
-    with_formula: bool,
-) -> Residual:
-    """Return what is left: whether it is white, and formulas for what nothing explains."""
-    white, p = whiteness(motion, moved.taken)
-    physics = moved.taken.freedom.physics(moved.taken.fit.z)
-    formulas = describe(shop.strips, physics) if moved.unexplained else ()
-    gained = _described(shop, found, formulas) if with_formula and formulas else None
-    return Residual(white and not unexplained, p, "; ".join(map(str, formulas)) or None, gained)
-
-
-def _described(shop: _Workshop, found: Robot, formulas: Sequence[Formula]) -> dict[str, Misfit]:
-    """Judge what formulas added to the robot found gain on the recordings set aside."""
-    change = with_formulas(formulas)
-    misfits = judge(shop.split.held, shop.held, shop.noise, found, found, change)
-    return {column: m for column, m in misfits.items() if m.before != m.after}
-
-
-def _set_clocks(shop: _Workshop, found: Robot) -> None:
-    """Take the camera clocks out of the recordings set aside, too: a nuisance, as a start pose is."""
-    held = Comparison(shop.held, False, shop.pool)
-    held.set_offsets(fitted_offsets(held, lambda: held.errors(found.physics))[0])
-
-
-def _found(
-    shop: _Workshop, selection: Selection, explained: Explanation, robot: Robot
-) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
-    """Return what was found, and robots with an alternative in its place."""
-    taken = explained.taken
-    if not taken.effects:
-        return (), ()
-    spans = intervals(selection, taken)
-    held = Comparison(shop.held, selection.comparison.sight, shop.pool)
-    with_all = cost(held.errors(robot.physics)) if held.strips else 0.0
-    out, rivals = [], []
-    for step in explained.steps:
-        rest = {k: v for k, v in robot.effects.items() if k != step.effect}
-        without = robot.model_copy(update={"effects": rest})
-        gain = cost(held.errors(without.physics)) - with_all if held.strips else float("nan")
-        others = alternatives(selection, explained, step)
-        rivals += [without.with_effects(model.values) for model in others.values()]
-        out.append(Found(step.effect, tuple(others), spans[step.effect], gain, step.null_95, step.p))
-    return tuple(out), tuple(rivals)
-
-
-def _map(
-    shop: _Workshop,
-    found: Robot,
-    motion: Selection,
-    moved: Explanation,
-    seen: Explanation | None,
-    doubted: bool,
-) -> Map:
-    explained = (not moved.unexplained, not (seen and seen.unexplained))
-    mover = moved.taken.freedom.physics(moved.taken.fit.z)
-    nothing = motion.nothing.fit.errors
-    return Map(
-        shop.strips,
-        nothing,
-        motion.cells,
-        shop.robot.physics,
-        mover,
-        found.physics,
-        explained,
-        doubted,
-        moved.spot,
-    )

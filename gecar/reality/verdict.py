@@ -8,13 +8,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gecar.errors import expected
-from gecar.reality.holdout import Misfit
 from gecar.world.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """NRMSE of a channel over the recordings set aside: RMSE over the standard deviation of what was measured."""
+
+    before: float
+    after: float
+    floor: float
 
 
 @dataclass(frozen=True)

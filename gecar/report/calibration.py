@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gecar.reality.calibration import Calibration, Fitted
-from gecar.reality.holdout import Misfit
-from gecar.reality.identifiable import BLIND
+from gecar.reality.calibrate.calibration import Calibration, FittedConstant
+from gecar.reality.calibrate.identifiability import BLIND
+from gecar.reality.verdict import Misfit
 
 
 def calibration_lines(result: Calibration) -> list[str]:
@@ -25,10 +25,17 @@ def calibration_lines(result: Calibration) -> list[str]:
             "the part held out" if result.by_time else f"the recordings held out ({', '.join(result.held)})"
         )
         lines.append(f"NRMSE on {where}, before and after: {channels_words(result)}.")
+    if result.worse:
+        lines.append(f"These constants do worse there in {', '.join(result.worse)}: do not use them unseen.")
+    if result.unexplained:
+        lines.append(
+            f"They do not explain the misfit in {', '.join(result.unexplained)}: physics is missing that no constant "
+            "of this robot has. `gecar discover` looks for it."
+        )
     return lines
 
 
-def fitted_line(fitted: Fitted) -> str:
+def fitted_line(fitted: FittedConstant) -> str:
     """Say what a constant was and is, with its 95 % interval."""
     unit = fitted.constant.unit
     interval = f"{fitted.rounded(fitted.low)} to {fitted.rounded(fitted.high)}"
@@ -70,6 +77,7 @@ def calibration_table(result: Calibration) -> dict[str, Any]:
             "recordings": list(result.held),
             "by_time": result.by_time,
             "channels": {name: _misfit(m) for name, m in result.channels.items()},
+            "worse": list(result.worse), "unexplained": list(result.unexplained),
         },
         "recordings": {
             name: {column: _misfit(m) for column, m in columns.items()} for name, columns in result.recordings.items()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gecar.reality.gap import CHANNELS, Gap, Trial
+from gecar.reality.compare.gap import CHANNELS, Gap, Trial
 from gecar.world.rollout import Outcome
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from gecar.reality.holdout import Misfit
-from gecar.reality.verdict import Found, Interval, Place, Verdict
+from gecar.reality.verdict import Found, Interval, Misfit, Place, Verdict
 from gecar.world.effects import BY_ID
 
 CHANNEL_WORDS = {

@@ -6,7 +6,9 @@ the kernels hold all effects always; identification frees some and pins the rest
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +38,15 @@ class Parameter:
         SI value of one unit.
     start
         Where identification starts from, in that unit, when the neutral value itself says nothing.
+    shape_step
+        For a parameter that only shapes the effect: a change that is visible, in that unit.
+    by_ratio
+        Whether it acts by its ratio, so that fits run in its logarithm.
+    search_spread
+        Standard deviation of a derivative-free search, in coordinates.
+    model_error, model_error_steps
+        How far a fitted value may be off because the simulation is not reality: as a share of its size, and in
+        sizes worth a name. Measured against a 3D engine; gears that give add to their play 0.3 to 0.8 degrees there.
     """
 
     field: str
@@ -47,6 +58,34 @@ class Parameter:
     worthwhile: float
     si: float = 1.0
     start: float | None = None
+    shape_step: float = 0.0
+    by_ratio: bool = False
+    search_spread: float = 1.0
+    model_error: float = 0.02
+    model_error_steps: float = 0.15
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a parameter space on which derivatives mislead is searched.
+
+    Attributes
+    ----------
+    apart
+        How far starting values are from each other [coordinates].
+    restarts
+        How many starting values there are at most.
+    finalists
+        How many of them are searched on.
+    generations, trials_factor
+        For so many generations of so many times the usual trials.
+    """
+
+    apart: float = 5.5
+    restarts: int = 6
+    finalists: int = 2
+    generations: int = 22
+    trials_factor: int = 1
 
 
 @dataclass(frozen=True)
@@ -67,6 +106,20 @@ class Effect:
         In what motion it shows.
     source
         Where the law and the bounds come from.
+    needs
+        What recordings must have to show it: ``floor``, ``pose``, ``two motors``, ``both directions``, ``full duty``.
+    starts
+        Values identification starts from, by label; () where they are scanned, or a few sizes on both sides of
+        neutral will do.
+    scan
+        How starting values are scanned, a name in `gecar.reality.fitting.initial_values`.
+    search
+        Set where derivatives mislead: slip, play, stiction, thresholds, an edge on the floor, waves.
+    differentiable
+        Whether derivatives at a fit say what other recordings would have made of it.
+    worth
+        The sizes, by label, all of which a find must reach to be worth a name: one set of them is enough; () where
+        the parameters' own ``worthwhile`` decide.
     """
 
     id: str
@@ -75,9 +128,32 @@ class Effect:
     channels: tuple[str, ...]
     signature: str
     source: str
+    needs: tuple[str, ...] = ()
+    starts: tuple[Mapping[str, float], ...] = ()
+    scan: str = ""
+    search: Search | None = None
+    differentiable: bool = True
+    worth: tuple[Mapping[str, float], ...] = ()
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it changes what the colour sensor reads, and nothing else."""
+        return self.channels == ("sensor",)
 
 
 _P = Parameter
+
+
+def _values(label: str, *sizes: float) -> tuple[dict[str, float], ...]:
+    return tuple({label: size} for size in sizes)
+
+
+_SHIFTS = tuple(
+    {"dx_m": dx, "dy_m": dy, "angle_rad": angle}
+    for dx, dy, angle in itertools.product(
+        (-0.024, -0.012, 0.0, 0.012, 0.024), (-0.024, -0.012, 0.0, 0.012, 0.024), (-0.012, 0.0, 0.012)
+    )
+)
 _LAW_MOTOR = (
     "brushed DC motor with gearbox: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
 )
@@ -95,38 +171,49 @@ CATALOGUE: tuple[Effect, ...] = (
            ("motor",), "high speed", _LAW_MOTOR),
     Effect("static_friction", "breakaway friction above sliding friction",
            (_P("static_friction", "extra_torque_nm", "N m", 0.0, 0.12, 0.0, 0.003),
-            _P("stribeck_speed", "speed_rad_s", "rad/s", 0.05, 8.0, 1.0, 0.0)),
-           ("motor",), "from rest; small duty never moves", _LAW_MOTOR + " (Stribeck curve, exponent 2)"),
+            _P("stribeck_speed", "speed_rad_s", "rad/s", 0.05, 8.0, 1.0, 0.0, by_ratio=True, search_spread=0.7)),
+           ("motor",), "from rest; small duty never moves", _LAW_MOTOR + " (Stribeck curve, exponent 2)",
+           scan="slow speeds", search=Search()),
     Effect("friction_asymmetry", "friction or gain differs forward and backward",
            (_P("friction_ratio", "friction_ratio", "-", -0.9, 0.9, 0.0, 0.08),
             _P("direction_gain", "gain_ratio", "-", -0.3, 0.3, 0.0, 0.005)),
-           ("motor",), "sign of the speed", _EV3_FITS),
+           ("motor",), "sign of the speed", _EV3_FITS,
+           needs=("both directions",)),
     Effect("backlash", "backlash in the gears",
-           (_P("backlash", "angle_deg", "deg", 0.0, 25.0, 0.0, 0.8, DEG),),
+           (_P("backlash", "angle_deg", "deg", 0.0, 25.0, 0.0, 0.8, DEG, model_error=0.12, model_error_steps=0.6),),
            ("motor", "pose"), "reversals: the encoder turns, the robot waits",
-           "dead-zone model of play: Nordin and Gutman, Automatica 38(10), 2002; EV3 gears: 3 deg (Benedettelli)"),
+           "dead-zone model of play: Nordin and Gutman, Automatica 38(10), 2002; EV3 gears: 3 deg (Benedettelli)",
+           needs=("floor",), starts=_values("angle_deg", 2.0, 5.0, 10.0), search=Search()),
     Effect("dead_band", "small duty gives no torque",
-           (_P("dead_band", "duty_pct", "%", 0.0, 40.0, 0.0, 1.0, 0.01),
-            _P("dead_band_offset", "offset_share", "-", 0.0, 1.0, 1.0, 0.0)),
-           ("motor",), "small duty", "dead zone of PWM drives; one EV3 motor did not move at 5 % duty"),
+           (_P("dead_band", "duty_pct", "%", 0.0, 40.0, 0.0, 1.0, 0.01, model_error=0.05),
+            _P("dead_band_offset", "offset_share", "-", 0.0, 1.0, 1.0, 0.0, shape_step=0.1)),
+           ("motor",), "small duty", "dead zone of PWM drives; one EV3 motor did not move at 5 % duty",
+           scan="duty levels", search=Search(),
+           # friction holds 4 % of an EV3's duty anyway: a threshold without an offset must exceed it
+           worth=({"duty_pct": 1.0, "offset_share": 0.3}, {"duty_pct": 5.0})),
     Effect("full_duty", "full duty gives more than the duties below it would say",
            (_P("full_duty_gain", "gain", "-", -0.1, 0.2, 0.0, 0.005),),
-           ("motor",), "duty of 100 %", "a bridge that need not switch loses no dead time; two EV3 motors: 1 % faster"),
+           ("motor",), "duty of 100 %", "a bridge that need not switch loses no dead time; two EV3 motors: 1 % faster",
+           needs=("full duty",)),
     Effect("rotor_inertia", "the motors are slower or quicker to speed up",
            (_P("inertia_scale", "scale", "-", 0.2, 4.0, 1.0, 0.05),),
            ("motor",), "steps", "rests on an estimated acceleration of the EV3 motor: calibrate it"),
     Effect("actuation_delay", "commands act late",
            (_P("actuation_delay", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
-           ("motor",), "every command change", "pure delay between command and motor"),
+           ("motor",), "every command change", "pure delay between command and motor",
+           starts=_values("time_s", 0.01, 0.03, 0.08)),
     Effect("start_latency", "the motors first answer some time after the start",
            (_P("start_latency", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
-           ("motor",), "the first moments, from rest", "EV3 step logs: 25-30 ms before motion, once"),
+           ("motor",), "the first moments, from rest", "EV3 step logs: 25-30 ms before motion, once",
+           starts=_values("time_s", 0.02, 0.05)),
     Effect("command_slew", "commands ramp instead of stepping",
            (_P("command_slew", "rate_pct_s", "%/s", 30.0, math.inf, math.inf, 0.0, 0.01, 500.0),),
-           ("motor",), "big steps", "rate limiter on duty"),
+           ("motor",), "big steps", "rate limiter on duty",
+           starts=_values("rate_pct_s", 1500.0, 600.0, 250.0, 100.0)),
     Effect("motor_gain_asymmetry", "one motor is stronger than the other",
            (_P("gain_difference", "right_minus_left", "-", -0.4, 0.4, 0.0, 0.005),),
-           ("motor",), "straight runs curve; the encoders show it", _EV3_FITS),
+           ("motor",), "straight runs curve; the encoders show it", _EV3_FITS,
+           needs=("two motors",)),
     Effect("supply_voltage", "the battery's level differs",
            (_P("supply_scale", "scale", "-", 0.5, 1.3, 1.0, 0.005),),
            ("motor",), "all speeds", "6.0-9.0 V over an EV3 battery's charge"),
@@ -138,53 +225,71 @@ CATALOGUE: tuple[Effect, ...] = (
            ("motor",), "late against early", "linear fall of open-circuit voltage"),
     Effect("torque_ripple", "torque varies with the shaft's angle",
            (_P("ripple_amplitude", "amplitude_nm", "N m", 0.0, 0.1, 0.0, 0.003),
-            _P("ripple_cycles", "cycles_per_rev", "1/rev", 1.0, 48.0, 1.0, 0.0),
-            _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0),
-            _P("ripple_lead", "right_lead_rad", "rad", -math.pi, math.pi, 0.0, 0.0)),
-           ("motor",), "periodic in the shaft's angle", "cogging and gear mesh, first harmonic"),
+            # over 100 rad of shaft, 0.01 of a cycle is 1 rad of phase
+            _P("ripple_cycles", "cycles_per_rev", "1/rev", 1.0, 48.0, 1.0, 0.0, shape_step=0.01),
+            _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0, shape_step=0.3),
+            _P("ripple_lead", "right_lead_rad", "rad", -math.pi, math.pi, 0.0, 0.0, shape_step=0.3, search_spread=0.2)),
+           ("motor",), "periodic in the shaft's angle", "cogging and gear mesh, first harmonic",
+           scan="shaft cycles", search=Search()),
     Effect("speed_limit", "firmware caps the speed",
            (_P("speed_limit", "speed_rad_s", "rad/s", 1.0, math.inf, math.inf, 0.0, 1.0, 11.0),),
-           ("motor",), "high speed", "Motor.run caps the EV3 large motor at 800 deg/s"),
+           ("motor",), "high speed", "Motor.run caps the EV3 large motor at 800 deg/s",
+           scan="shares of top speed"),
     Effect("wheel_radius", "the wheels' rolling radius differs",
            (_P("radius_scale", "scale", "-", 0.7, 1.3, 1.0, 0.01),),
-           ("pose",), "pose against encoders, straight", _GEOMETRY),
+           ("pose",), "pose against encoders, straight", _GEOMETRY,
+           needs=("floor",)),
     Effect("wheel_radius_difference", "one wheel is larger",
            (_P("radius_difference", "right_minus_left", "-", -0.2, 0.2, 0.0, 0.005),),
-           ("pose",), "the path curves while the encoders agree", _GEOMETRY),
+           ("pose",), "the path curves while the encoders agree", _GEOMETRY,
+           needs=("floor",)),
     Effect("track_width", "the effective track differs",
            (_P("track_scale", "scale", "-", 0.7, 1.4, 1.0, 0.01),),
-           ("pose",), "pose against encoders, turning", _GEOMETRY),
+           ("pose",), "pose against encoders, turning", _GEOMETRY,
+           needs=("floor",)),
     Effect("tyre_friction", "the tyres grip less, or more",
            (_P("tyre_friction", "coefficient", "-", 0.03, 1.5, None, 0.15),),
-           ("pose",), "hard acceleration, fast turns", _TYRE),
+           ("pose",), "hard acceleration, fast turns", _TYRE,
+           needs=("floor",), starts=_values("coefficient", 0.6, 0.35, 0.15, 1.2), search=Search()),
     Effect("slippery_patch", "grip is lost in one place on the floor",
-           (_P("patch_radius", "radius_m", "m", 0.0, 0.6, 0.0, 0.05),
-            _P("patch_x", "x_m", "m", -5.0, 5.0, 0.0, 0.0),
-            _P("patch_y", "y_m", "m", -5.0, 5.0, 0.0, 0.0),
-            _P("patch_friction", "coefficient", "-", 0.01, 0.6, 0.1, 0.0)),
-           ("pose",), "a place on the map", _TYRE),
+           (_P("patch_radius", "radius_m", "m", 0.0, 0.6, 0.0, 0.05, search_spread=1.5),
+            _P("patch_x", "x_m", "m", -5.0, 5.0, 0.0, 0.0, shape_step=0.03, search_spread=2.0),
+            _P("patch_y", "y_m", "m", -5.0, 5.0, 0.0, 0.0, shape_step=0.03, search_spread=2.0),
+            _P("patch_friction", "coefficient", "-", 0.01, 0.6, 0.1, 0.0, by_ratio=True, search_spread=0.5,
+               model_error=0.05)),
+           ("pose",), "a place on the map", _TYRE,
+           needs=("floor", "pose"), scan="floor cells", differentiable=False,
+           # the edge makes many valleys close together: with fewer finalists three seeds ended in three places
+           search=Search(apart=1.5, restarts=12, finalists=6, generations=40, trials_factor=3)),
     Effect("caster_drag", "the caster drags",
            (_P("caster_friction", "coefficient", "-", 0.0, 1.5, 0.0, 0.05),),
-           ("pose", "motor"), "constant drag, turning", "Coulomb friction at the caster's contact"),
+           ("pose", "motor"), "constant drag, turning", "Coulomb friction at the caster's contact",
+           needs=("floor",)),
     Effect("rolling_resistance", "the tyres resist rolling",
            (_P("rolling_resistance", "coefficient", "-", 0.0, 0.3, 0.0, 0.01),),
-           ("motor", "pose"), "constant drag", "torque = coefficient x load x radius"),
+           ("motor", "pose"), "constant drag", "torque = coefficient x load x radius",
+           needs=("floor",)),
     Effect("floor_tilt", "the floor is not level",
            (_P("tilt_x", "x_rad", "rad", -0.25, 0.25, 0.0, 0.004),
             _P("tilt_y", "y_rad", "rad", -0.25, 0.25, 0.0, 0.004)),
-           ("pose", "motor"), "depends on the heading", "gravity's component along the floor, positive along +x, +y"),
+           ("pose", "motor"), "depends on the heading", "gravity's component along the floor, positive along +x, +y",
+           needs=("floor",)),
     Effect("load_transfer", "the centre of mass is higher or lower",
            (_P("com_height", "height_m", "m", 0.0, 0.15, None, 0.01),),
-           ("pose",), "hard acceleration with slip", "quasi-static load transfer"),
+           ("pose",), "hard acceleration with slip", "quasi-static load transfer",
+           needs=("floor",)),
     Effect("com_offset", "the centre of mass is further ahead or behind",
            (_P("com_ahead", "ahead_m", "m", -0.084, 0.0, None, 0.004),),
-           ("pose",), "turns", "rigid body on two wheels and a caster"),
+           ("pose",), "turns", "rigid body on two wheels and a caster",
+           needs=("floor",)),
     Effect("sensor_lag", "the colour sensor answers gradually",
            (_P("sensor_lag", "time_constant_s", "s", 0.0, 0.3, 0.0, 0.005),),
-           ("sensor",), "line edges", _SENSOR),
+           ("sensor",), "line edges", _SENSOR,
+           starts=_values("time_constant_s", 0.01, 0.04, 0.1)),
     Effect("sensor_delay", "the colour sensor answers late",
            (_P("sensor_delay", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
-           ("sensor",), "line edges", _SENSOR),
+           ("sensor",), "line edges", _SENSOR,
+           starts=_values("time_s", 0.01, 0.04, 0.1)),
     Effect("sensor_gain", "white and black read otherwise",
            (_P("sensor_gain", "gain", "-", 0.2, 2.0, 1.0, 0.02),
             _P("sensor_offset", "offset_pct", "%", -40.0, 40.0, 0.0, 1.0)),
@@ -192,7 +297,8 @@ CATALOGUE: tuple[Effect, ...] = (
     Effect("sensor_position", "the sensor is mounted elsewhere",
            (_P("sensor_ahead", "ahead_m", "m", 0.0, 0.16, None, 0.0015),
             _P("sensor_left", "left_m", "m", -0.08, 0.08, None, 0.0015)),
-           ("sensor",), "edges come early or late", _SENSOR),
+           ("sensor",), "edges come early or late", _SENSOR,
+           scan="around the mount"),
     Effect("spot_size", "the sensor sees a larger or smaller spot",
            (_P("spot_diameter", "diameter_m", "m", 0.001, 0.05, None, 0.002),),
            ("sensor",), "width of edges", _SENSOR),
@@ -200,13 +306,15 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("line_dx", "dx_m", "m", -0.12, 0.12, 0.0, 0.002),
             _P("line_dy", "dy_m", "m", -0.12, 0.12, 0.0, 0.002),
             _P("line_angle", "angle_rad", "rad", -0.1, 0.1, 0.0, 0.002)),
-           ("sensor",), "a place on the map", "rigid displacement of the printed course about the field's origin"),
+           ("sensor",), "a place on the map", "rigid displacement of the printed course about the field's origin",
+           needs=("pose",), starts=_SHIFTS),
     Effect("clock_skew", "the log's clock runs fast or slow",
            (_P("clock_skew", "rate", "-", -0.06, 0.06, 0.0, 0.002),),
            ("clock",), "grows with time", "log time = true time x (1 + rate)"),
     Effect("pose_delay", "camera poses are late",
            (_P("pose_delay", "time_s", "s", -0.1, 0.3, 0.0, 0.005),),
-           ("pose", "clock"), "all motion, in the pose only", "pure delay between motion and logged pose"),
+           ("pose", "clock"), "all motion, in the pose only", "pure delay between motion and logged pose",
+           needs=("floor", "pose")),
 )  # fmt: skip
 
 BY_ID = {effect.id: effect for effect in CATALOGUE}

@@ -17,10 +17,10 @@ from gecar.errors import InputError
 from gecar.language.grammar import read_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import Program, mirrored, parse_program, read_program
-from gecar.reality.importing.logs import ImportOptions, import_logs
-from gecar.reality.known_robot import known_robot
-from gecar.reality.recording import Recording, read_recording, write_recording
-from gecar.reality.setup import Setup
+from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.recordings.recording import Recording, read_recording, write_recording
+from gecar.reality.recordings.setup import Setup
 from gecar.results.checkpoint import unpack
 from gecar.results.config import as_toml, configure, read_config
 from gecar.results.folder import read_history, read_result

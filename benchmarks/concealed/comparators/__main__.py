@@ -11,7 +11,7 @@ from benchmarks.concealed.comparators.sparse import sparse_regression
 from gecar.cli.voice import plain
 from gecar.files import write_whole
 from gecar.reality import discovery
-from gecar.reality.recording import Case, read_case
+from gecar.reality.recordings.recording import Case, read_case
 
 
 def main() -> None:

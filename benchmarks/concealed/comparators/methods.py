@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 from unittest.mock import patch
 
@@ -13,17 +13,24 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality import discovery
-from gecar.reality.blocks import Blocks
-from gecar.reality.chain import MOST_EFFECTS, Explanation
-from gecar.reality.fitting import cost, weights
-from gecar.reality.freedom import free
-from gecar.reality.known_robot import known_robot
-from gecar.reality.model import Effects, Model, Step, worthwhile
-from gecar.reality.replay import Film
-from gecar.reality.selection import Selection
-from gecar.reality.starts import starts
-from gecar.reality.strip import CHANNELS, Strip
-from gecar.reality.uncertainty import NORMAL_95, deviations
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.initial_values import initial_values
+from gecar.reality.fitting.model import NOTHING_TOLERATED, Effects, Model, Step
+from gecar.reality.fitting.parameters import free
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.replay.channels import CHANNELS
+from gecar.reality.replay.replayer import Replayer, replayer_of
+from gecar.reality.residuals import of_case
+from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
+from gecar.reality.selection import cross_validation, stepwise
+from gecar.reality.selection.acceptance import is_worthwhile
+from gecar.reality.selection.model_tolerance import without_tolerated
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.thresholds import MOST_EFFECTS
+from gecar.reality.uncertainty.intervals import NORMAL_95, deviations
 from gecar.reality.verdict import NextRecording
 
 Array = npt.NDArray[np.float64]
@@ -33,119 +40,135 @@ REFITTED = 5  # effects a stage, as `gecar`
 START_S = 1.0  # over which an open-loop replay's start pose is fitted
 
 
-def by_bic(selection: Selection) -> Explanation:
+def by_bic(problem: Problem) -> Explanation:
     """Take the effect that lowers BIC most, as long as one does (Schwarz 1978); it has no way to abstain.
 
     Effects are screened as `gecar` screens them: only the criterion differs.
     """
-    model, steps, tried = selection.nothing, list[Step](), list[tuple[Step, ...]]()
+    model, steps, tried = problem.known, list[Step](), list[tuple[Step, ...]]()
     while len(steps) < MOST_EFFECTS:
-        stage = _stage(selection, model)
+        stage = _stage(problem, model)
         tried.append(tuple(stage))
         best = min(stage, key=lambda step: _bic(step.model), default=None)
         if best is None or _bic(best.model) >= _bic(model):
             break
         steps.append(best)
         model = best.model
-    return Explanation(model, tuple(steps), tuple(tried), unexplained=False)
+    return _explanation(problem, model, steps, tried)
+
+
+def _explanation(
+    problem: Problem, model: Model, steps: Sequence[Step], tried: Sequence[tuple[Step, ...]]
+) -> Explanation:
+    left = without_tolerated(problem, model)
+    return Explanation(problem, model, left, tuple(steps), tuple(tried), unexplained=False)
 
 
 def _bic(model: Model) -> float:
     """Return the Bayesian information criterion; the cost is half a sum of squares in units of the noise."""
-    return 2.0 * model.cost + len(model.fit.z) * math.log(max(len(model.fit.errors), 1))
+    return 2.0 * model.cost + len(model.z) * math.log(max(len(model.errors), 1))
 
 
-def _stage(selection: Selection, model: Model) -> list[Step]:
-    """Fit the effects that promise most, by their slopes or from the best of their starts."""
-    others = [e for e in selection.catalogue if e not in model.effects]
-    begun = {e: _begun(selection, model, e) for e in others}
+def _stage(problem: Problem, model: Model) -> list[Step]:
+    """Fit the effects that promise most, by their sensitivities or from the best of their starts."""
+    others = [e for e in problem.catalogue if e not in model.effects]
+    begun = {e: _begun(problem, model, e) for e in others}
     best = sorted(others, key=lambda e: -begun[e][0])[:REFITTED]
-    fitted = [selection.refit((*model.effects, e), begun[e][1], ROUNDS) for e in best]
+    fitted = [problem.estimator.fit((*model.effects, e), begun[e][1], ROUNDS) for e in best]
     return sorted((Step(m.effects[-1], model, m, model.cost - m.cost) for m in fitted), key=lambda s: -s.gain)
 
 
-def _begun(selection: Selection, model: Model, effect: str) -> tuple[float, Effects]:
+def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]:
     """Return what one more effect promises to gain, and the best of its starts."""
-    freedom = free(selection.robot, (*model.effects, effect))
-    residual = selection.residual(freedom)
+    estimator = problem.estimator
+    parameters = free(estimator.robot, (*model.effects, effect))
+    residual = estimator.residual(parameters)
 
     def errors(values: Mapping[str, float]) -> Array:
-        return residual(freedom.vector({**model.values, effect: values}))
+        return residual(parameters.vector({**model.values, effect: values}))
 
-    begun = starts(effect, selection.robot, selection.recordings, errors)
+    begun = initial_values(effect, estimator.robot, problem.recordings, errors)
     places = [{**model.values, effect: v} for v in begun]
-    costs = [cost(residual(freedom.vector(values))) for values in places]
+    costs = [cost(residual(parameters.vector(values))) for values in places]
     gain = model.cost - min(costs, default=math.inf)
-    return max(gain, _promise(selection, model, effect)), places[int(np.argmin(costs))] if places else {}
+    return (
+        max(gain, estimator.linear_gain(model, effect)),
+        places[int(np.argmin(costs))] if places else {},
+    )
 
 
-def _promise(selection: Selection, model: Model, effect: str) -> float:
-    """Return what the slopes alone promise an effect gains, beside the model's own parameters: a score test."""
-    w = np.sqrt(weights(model.fit.errors))
-    g = selection.beside(model, selection.felt(model, effect) * w[:, None])
-    return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.fit.errors)) ** 2))
-
-
-def everything(selection: Selection) -> Explanation:
+def everything(problem: Problem) -> Explanation:
     """Fit all effects at once; name those of a size worth it whose 95 % interval leaves out neutral."""
-    model = selection.refit(selection.catalogue, {}, ROUNDS)
-    sure = np.abs(model.fit.z) > NORMAL_95 * deviations(selection, model)
-    seen = {c.effect.id for c, told in zip(model.freedom.coordinates, sure, strict=True) if told}
-    named = [e for e in selection.catalogue if e in seen and worthwhile(model, e)]
-    steps = [Step(e, selection.nothing, model, selection.nothing.cost - model.cost) for e in named]
-    return Explanation(model, tuple(steps), ((),) * len(steps), unexplained=False)
+    model = problem.estimator.fit(problem.catalogue, {}, ROUNDS)
+    sure = np.abs(model.z) > NORMAL_95 * deviations(problem.estimator, model)
+    seen = {c.effect.id for c, told in zip(model.parameters.coordinates, sure, strict=True) if told}
+    named = [e for e in problem.catalogue if e in seen and is_worthwhile(model, e)]
+    steps = [Step(e, problem.known, model, problem.known.cost - model.cost) for e in named]
+    return _explanation(problem, model, steps, ((),) * len(steps))
 
 
-class WithoutNull(Selection):
-    """Takes a step when left-out recordings gain anything at all."""
-
-    def judged(self, step: Step) -> Step:
-        """Judge a step by leaving out recordings alone."""
-        return replace(super().judged(step), null_95=0.0, p=0.0)
+def without_null(problem: Problem, step: Step) -> Step:
+    """Judge a step by leaving out recordings alone: take it when they gain anything at all."""
+    return replace(cross_validation.judged(problem, step), null_95=0.0, p=0.0)
 
 
-class WithoutRefit(Selection):
-    """Ranks effects by what their slopes promise, and takes one step along them: screening, never a fit."""
-
-    def steps(self, model: Model) -> list[Step]:
-        """Rank every other effect by its slopes at the model."""
-        promises = {e: _promise(self, model, e) for e in self.catalogue if e not in model.effects}
-        best = sorted(promises, key=lambda e: -promises[e])[:REFITTED]
-        return [self._linear(model, effect, promises[effect]) for effect in best]
-
-    def _linear(self, model: Model, effect: str, promise: float) -> Step:
-        found = self.refit((*model.effects, effect), model.values)
-        colour = self.blocks.colour(found.fit.errors)
-        before, after = (self.blocks.structure(m.fit.errors, colour) for m in (model, found))
-        size = worthwhile(found, effect)
-        return Step(effect, model, found, promise, worthwhile=size, before=before, after=after)
-
-    def refit(
-        self, effects: Sequence[str], values: Effects, rounds: int = 1, shift: Array | None = None
-    ) -> Model:
-        """Take one step along the slopes, however many rounds are asked for."""
-        return super().refit(effects, values, min(rounds, 1), np.zeros(1) if shift is None else shift)
-
-    def polished(self, model: Model, spread: float = 0.0) -> Model:  # noqa: ARG002
-        """Leave the model as it is."""
-        return model
+def by_sensitivities(problem: Problem, model: Model) -> list[Step]:
+    """Rank every other effect by its sensitivities, and take one step along them: screening, never a fit."""
+    others = (e for e in problem.catalogue if e not in model.effects)
+    promises = {e: problem.estimator.linear_gain(model, e) for e in others}
+    best = sorted(promises, key=lambda e: -promises[e])[:REFITTED]
+    return [_linear_step(problem.estimator, model, effect, promises[effect]) for effect in best]
 
 
-class OpenLoop(Strip):
+def _linear_step(estimator: Estimator, model: Model, effect: str, promise: float) -> Step:
+    found = estimator.fit((*model.effects, effect), model.values)
+    inflation = estimator.blocks.inflation(found.errors)
+    before, after = (estimator.blocks.excess_energy(m.errors, inflation) for m in (model, found))
+    size = is_worthwhile(found, effect)
+    return Step(effect, model, found, promise, worthwhile=size, energy_before=before, energy_after=after)
+
+
+_fit = Estimator.fit
+
+
+def one_iteration(
+    estimator: Estimator,
+    effects: Sequence[str],
+    values: Effects,
+    rounds: int = 1,
+    tolerated: Array = NOTHING_TOLERATED,
+) -> Model:
+    """Take one step along the sensitivities, however many rounds are asked for."""
+    return _fit(estimator, effects, values, min(rounds, 1), tolerated)
+
+
+def as_it_is(estimator: Estimator, model: Model, spread: float = 0.0) -> Model:  # noqa: ARG001
+    """Leave the model as it is."""
+    return model
+
+
+@dataclass(frozen=True)
+class OpenLoop(RecordingResiduals):
     """Motion's residuals as they accumulate over a whole replay, in units of the sensors' noise: not whitened."""
 
-    def __init__(self, *parts: Any) -> None:
-        super().__init__(*parts)
-        self.whole = Film(self.recording, self.noise.sd)
-        self.whole.start = self.whole.aligned_start(known_robot(self.recording).physics, START_S)
+    open_start: Array = field(default_factory=lambda: np.zeros(3))
 
-    def errors(self, physics: npt.NDArray[Any], sight: bool) -> Array:
-        """Return the residuals of motion open loop, or those of the colour sensor as they are."""
-        if sight:
-            return super().errors(physics, sight)
-        self.whole.offset_s = self.film.offset_s
-        _, rows, _, poses = self.whole.play(physics)
+    def motion_errors(self, physics: npt.NDArray[Any]) -> Array:
+        """Return the residuals of motion open loop."""
+        _, rows, _, poses = self._whole.play(physics, self.open_start)
         return np.concatenate([rows.T.ravel(), poses.T.ravel()])
+
+    @property
+    def _whole(self) -> Replayer:
+        return replayer_of(self.recording, self.noise.sd).with_clock(self.nuisances.clock_offset_s)
+
+
+def open_loop_residuals_of(*parts: Any) -> RecordingResiduals:
+    """Set a recording beside its open-loop simulation."""
+    beside = residuals_of(*parts)
+    known = known_robot(beside.recording).physics
+    start = replayer_of(beside.recording, beside.noise.sd).aligned_start(known, START_S)
+    return OpenLoop(**vars(beside), open_start=start)
 
 
 def _white(blocks: Blocks, errors: Array) -> Array:  # noqa: ARG001
@@ -153,13 +176,18 @@ def _white(blocks: Blocks, errors: Array) -> Array:  # noqa: ARG001
     return np.ones(len(CHANNELS))
 
 
+_NO_HOTSPOT = (discovery, "hotspot", lambda *_: None)
 # By name: what stands in for which part, and where that part is.
 METHODS: dict[str, tuple[tuple[Any, str, object], ...]] = {
-    "bic": ((discovery, "explain", by_bic),),
-    "everything": ((discovery, "explain", everything),),
-    "no_whitening": ((discovery, "Strip", OpenLoop), (Blocks, "colour", _white)),
-    "no_null": ((discovery, "Selection", WithoutNull),),
-    "no_refit": ((discovery, "Selection", WithoutRefit),),
+    "bic": ((discovery, "explain", by_bic), _NO_HOTSPOT),
+    "everything": ((discovery, "explain", everything), _NO_HOTSPOT),
+    "no_whitening": ((of_case, "residuals_of", open_loop_residuals_of), (Blocks, "inflation", _white)),
+    "no_null": ((stepwise, "judged", without_null),),
+    "no_refit": (
+        (stepwise, "candidate_steps", by_sensitivities),
+        (Estimator, "fit", one_iteration),
+        (Estimator, "searched", as_it_is),
+    ),
 }
 # What the scorer does not read costs time.
 _UNREAD: tuple[tuple[Any, str, Callable[..., object]], ...] = (

@@ -17,15 +17,17 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
 from gecar.reality.discovery import MEMORY_S
-from gecar.reality.freedom import Coordinate, free
-from gecar.reality.holdout import judge, split
-from gecar.reality.known_robot import known_robot
-from gecar.reality.noise import estimate_noise
-from gecar.reality.recording import Case, Recording
-from gecar.reality.strip import Strip
-from gecar.reality.uncertainty import NORMAL_95
+from gecar.reality.fitting.parameters import Coordinate, free
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove.holdout import Contender, judge
+from gecar.reality.recordings.known_robot import known_robot
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.recordings.split import hold_out
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.uncertainty.intervals import NORMAL_95
 from gecar.reality.verdict import Interval, Judgement
-from gecar.world.course import load_course
 from gecar.world.effects import CATALOGUE
 from gecar.world.robot import Robot
 
@@ -47,15 +49,15 @@ TORQUE_NM, SPEED_M_S, TURN_RAD_S, READING_PCT = 0.02, 0.01, 0.1, 3.0
 
 def sparse_regression(case: Case, holdout: Sequence[str]) -> dict[str, Any]:
     """Return a verdict in the form of ``verdict.json``."""
-    parts = split(case, holdout)
+    parts = hold_out(case, holdout)
     robot = known_robot(parts.fitted[0])
     noise = estimate_noise(parts.fitted, robot.physics, MEMORY_S)
-    course = load_course(parts.fitted[0].setup.course)
     known = {c.parameter.field: c for e in CATALOGUE for c in free(robot, [e.id]).coordinates}
-    strips = [Strip(r, noise, MEMORY_S, course) for r in (*parts.fitted, *parts.held)]
-    for strip in strips:
-        strip.set_path(robot.physics)
-    looked = [_sight(strip, robot) for strip in strips[: len(parts.fitted)]]
+    fitted, held = (
+        motion_residuals(some, noise, MEMORY_S, Threads()).with_paths(robot.physics)
+        for some in (parts.fitted, parts.held)
+    )
+    looked = [_sensor(run, robot) for run in fitted.recordings]
     equations = [e for r in parts.fitted for e in (*_torques(r, robot), *_rolling(r, robot))] + looked
     effects: dict[str, dict[str, Interval]] = {}
     for field, (size, sd) in _thresholded([_counted(*e, known) for e in equations if len(e[0])]).items():
@@ -63,7 +65,9 @@ def sparse_regression(case: Case, holdout: Sequence[str]) -> dict[str, Any]:
             known[field], size, sd
         )
     after = robot.with_effects({e: {label: i.value for label, i in p.items()} for e, p in effects.items()})
-    judged = Judgement((), False, judge(parts.held, strips[len(parts.fitted) :], noise, robot, after))
+    judged = Judgement(
+        (), False, judge(Contender(robot, held), Contender(after, held.with_paths(after.physics)))
+    )
     return {
         "verdict": "missing" if effects else "nothing",
         "effects": [
@@ -163,14 +167,14 @@ def _rolling(recording: Recording, robot: Robot) -> list[Equation]:
     return [(v - ahead, straight, SPEED_M_S), (turn - turned, turning, TURN_RAD_S)]
 
 
-def _sight(strip: Strip, robot: Robot) -> Equation:
+def _sensor(run: RecordingResiduals, robot: Robot) -> Equation:
     """Return what reading is left over [%] along the measured path."""
-    told = strip.readings(robot.physics)
-    seen = ~np.isnan(told) & ~np.isnan(strip.recording.reflection_pct)
+    told = run.readings(robot.physics)
+    seen = ~np.isnan(told) & ~np.isnan(run.recording.reflection_pct)
     if not seen.any():
         return np.zeros(0), {}, 1.0
     columns = {"sensor_gain": told, "sensor_offset": np.ones(len(told)), "sensor_delay": -_slope(told)}
-    left = strip.recording.reflection_pct - told
+    left = run.recording.reflection_pct - told
     return left[seen], {f: g[seen] for f, g in columns.items()}, READING_PCT
 
 

@@ -1,0 +1,1 @@
+"""Notes beside a verdict, and the recording to make next."""

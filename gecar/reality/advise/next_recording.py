@@ -1,0 +1,158 @@
+"""The recording to make next: from a library of command sequences a robot can drive, the one that tells most.
+
+Each is driven by the robot as found and by its rival, the robot with the confused effect exchanged or with a parameter
+at the end of its interval; chosen is the sequence in which their sensors differ most, in standard deviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.noise.sensor_noise import Noise
+from gecar.reality.recordings.recording import Recording, make_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
+from gecar.reality.replay.reflectance import readings_along
+from gecar.reality.replay.replayer import replayer_of
+from gecar.reality.verdict import Found, NextRecording
+from gecar.world.course import Course, load_course
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Commands = tuple[tuple[float, float, float], ...]
+
+ROW_S = 0.01
+START = (1.2, 0.6, 0.0)  # m, m, rad, where there is no course
+LEAST_DIFFERENCE = 9.0  # squared standard deviations: less tells nothing
+
+
+def _holds(length_s: float, *duties: tuple[float, float]) -> Commands:
+    return tuple(
+        (round(k * length_s, 2), left, right) for k, (left, right) in enumerate((*duties, (0.0, 0.0)))
+    )
+
+
+LIBRARY: dict[str, Commands] = {
+    "straight at rising speeds": _holds(
+        1.5, (15, 15), (25, 25), (40, 40), (55, 55), (-40, -40), (-55, -55), (-20, -20)
+    ),
+    "reversals": _holds(0.6, *((d, d) for d in (40, -40, 30, -30, 50, -50, 20, -20, 60, -60) for _ in (0,))),
+    "spins at rising speeds": _holds(1.2, (15, -15), (30, -30), (50, -50), (70, -70), (-30, 30), (-60, 60)),
+    "starts from rest at small duties": _holds(
+        0.8, *(d for k in (6, 8, 10, 12, 16, 20) for d in ((k, k), (0, 0)))
+    ),
+    "arcs to both sides": _holds(1.5, (50, 20), (20, 50), (60, 30), (30, 60), (-50, -20), (-20, -50)),
+    "full steps": _holds(0.7, *(d for k in (80, -80, 80, -80) for d in ((k, k), (0, 0), (k, -k), (0, 0)))),
+    "long and slow, then long and fast": _holds(4.0, (25, 25), (-25, -25), (60, 60), (-60, -60)),
+    "the line, crossed to and fro": _holds(0.8, *((d, d) for d in (25, -25, 25, -25, 40, -40, 40, -40))),
+}
+
+
+def suggest(
+    robot: Robot,
+    found: Sequence[Found],
+    rivals: Sequence[Robot],
+    like: Recording,
+    noise: Noise,
+    unexplained: bool,
+) -> NextRecording:
+    """Return what to record next, and why.
+
+    Parameters
+    ----------
+    robot
+        As found.
+    found
+        Its effects.
+    rivals
+        Robots that do as well on these recordings, one for each effect that has alternatives.
+    like
+        A recording whose rig and columns the next one will have.
+    noise
+        Of the sensors.
+    unexplained
+        Whether something is left that nothing explains.
+    """
+    if rivals:
+        confused = next(f for f in found if f.alternatives)
+        others = " and ".join(confused.alternatives)
+        name, apart = _telling(robot, rivals[0], like, noise)
+        if apart < LEAST_DIFFERENCE:
+            words = f"{name}: no sequence of the library tells {confused.id} from {others} with these sensors"
+            return NextRecording(words, LIBRARY[name])
+        return NextRecording(f"{name}: tells {confused.id} from {others}", LIBRARY[name])
+    if unexplained:
+        name = "long and slow, then long and fast"
+        return NextRecording(
+            f"{name}: shows whether what is left depends on speed, way or time", LIBRARY[name]
+        )
+    if found:
+        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
+        return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
+    words = "reversals: nothing is missing so far; this asks most of gears, friction and grip"
+    return NextRecording(words, LIBRARY["reversals"])
+
+
+def _at_interval_end(robot: Robot, found: Found) -> Robot:
+    """Return a robot with an effect's first parameter at the end of its interval."""
+    label, interval = next(iter(found.parameters.items()))
+    values = {name: i.value for name, i in found.parameters.items()}
+    return robot.with_effects({found.id: {**values, label: interval.high}})
+
+
+def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, float]:
+    """Return the sequence in which two robots part furthest, and how far [squared standard deviations]."""
+    apart = {name: difference(commands, robot, rival, like, noise) for name, commands in LIBRARY.items()}
+    best = max(apart, key=lambda name: apart[name])
+    return best, apart[best]
+
+
+def difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
+    """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations.
+
+    What encoders and camera would measure of the first is replayed by the second; what the colour sensors of both would
+    read is compared along the first one's path, on the course of a recording that read one.
+    """
+    course = _course_of(like)
+    start = START if course is None else (course.start.x_m, course.start.y_m, course.start.heading_rad)
+    rows = replayer_of(_recording(commands, {}, like), noise.sd).play(robot.physics, np.array(start)).rows
+    angles = {
+        "left_angle_deg": np.degrees(rows[:, LEFT_ANGLE]),
+        "right_angle_deg": np.degrees(rows[:, RIGHT_ANGLE]),
+    }
+    poses = {"x_m": rows[:, X], "y_m": rows[:, Y], "heading_deg": np.degrees(rows[:, HEADING])}
+    measured = {**angles, **(poses if like.setup.rig == "floor" else {})}
+    replayer = replayer_of(_recording(commands, measured, like), noise.sd, noise.walk, memory_s=1.0)
+    found = replayer.play(rival.physics)
+    apart = float(np.nansum(found.row_errors[:, :2] ** 2) + np.nansum(found.pose_errors**2))
+    if course is None:
+        return apart
+    path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
+    own, other = (_readings(replayer.t, path, course, r, noise.reflection_sd) for r in (robot, rival))
+    return apart + float(np.sum((own - other) ** 2)) / noise.reflection_sd**2
+
+
+def _course_of(like: Recording) -> Course | None:
+    """Return the course a recording's colour sensor read; None if there is none."""
+    reads = like.setup.rig == "floor" and like.setup.course != "none" and "reflection_pct" in like.measured
+    return load_course(like.setup.course) if reads else None
+
+
+def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
+    readings = np.empty(len(t))
+    floor, pitch = course.raster(course.pitch_m), course.pitch_m
+    readings_along(t, path, 0.0, sd, floor, pitch, robot.physics, np.zeros(3), readings)
+    return readings
+
+
+def _recording(commands: Commands, seen: dict[str, Array], like: Recording) -> Recording:
+    table = np.array(commands)
+    t = np.arange(0.0, table[-1, 0] + 0.5, ROW_S)
+    at = np.searchsorted(table[:, 0], t, side="right") - 1
+    duties = {"left_duty_pct": table[at, 1], "right_duty_pct": table[at, 2]}
+    return make_recording(
+        "next", {"t_s": t, **duties, **seen}, Setup(rig=like.setup.rig, duty_cap=like.setup.duty_cap)
+    )

@@ -1,0 +1,64 @@
+"""Notes beside a verdict: nuisances that were fitted, assumptions, and what could not be looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gecar.reality.recordings.split import Split
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.residuals.of_recording import RecordingResiduals
+
+
+def notes_on(
+    split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool, candidates: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """Return notes, a sentence or two each.
+
+    Parameters
+    ----------
+    split
+        What was fitted on and set aside.
+    fitted
+        The recordings fitted on, with their nuisances.
+    clocks_fitted
+        Whether each camera's clock offset was fitted.
+    doubted
+        Whether a misfit of readings points to the measured path, rather than to the sensor.
+    candidates
+        Effects that proved themselves where they were fitted, and were not confirmed.
+    """
+    notes = [
+        f"{effect} explains recordings it was fitted to, but gains nothing on those set aside, or its interval holds "
+        "its neutral value: a candidate, no finding."
+        for effect in candidates
+    ]
+    if split.by_time:
+        notes.append(
+            "Only one recording: its last part was set aside, so it is judged on later times, not on another run."
+        )
+    if clocks_fitted:
+        late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
+        notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
+    if doubted:
+        notes.append(
+            "Readings are right on even floor and wrong near lines, and neither the sensor nor the line explains it: "
+            "look at the camera's path, and how the sensor is mounted."
+        )
+    measured = {name for r in split.fitted for name in r.measured}
+    if not {"x_m", "heading_rad"} & measured:
+        notes.append("No pose was recorded: what only a camera sees was not looked for.")
+    located = [_start(run) for run in fitted.recordings if run.nuisances.start is not None]
+    if located:
+        notes.append(
+            f"Where no camera looked, readings tell the start, up to places that look the same: {'; '.join(located)}."
+        )
+    return tuple(notes)
+
+
+def _start(run: RecordingResiduals) -> str:
+    assert run.nuisances.start is not None
+    x, y, heading = run.nuisances.start.start
+    degrees = np.degrees(heading) % 360.0
+    return f"{run.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"

@@ -1,0 +1,1 @@
+"""A robot's own constants fitted to recordings."""

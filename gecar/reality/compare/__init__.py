@@ -1,0 +1,1 @@
+"""A program's simulation beside recordings of it."""

@@ -1,0 +1,1 @@
+"""Fits of effects to residuals: coordinates, starting values, models, nuisances."""

@@ -1,0 +1,142 @@
+"""Fits of effects to residuals, and the residuals' finite-difference sensitivities to effects' parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.model import NOTHING_TOLERATED, Effects, Model
+from gecar.reality.fitting.parameters import Parameters, free
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.optimisation.cma_es import cma_es
+from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares, weights
+from gecar.reality.residuals.of_case import Residuals
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+CACHED_FITS = 2  # whose sensitivities are kept: ten megabytes each
+REFINED_SPREAD = 0.25  # of a parameter's search spread: about a fit that least squares has refined
+LEAST_NORM = 1e-6  # weighted sensitivities smaller than this say nothing
+
+
+class Estimator:
+    """Fits a robot's effects to residuals.
+
+    Parameters
+    ----------
+    residuals
+        What is fitted.
+    robot
+        As far as it is known.
+    rng
+        Random generator of the searches.
+    """
+
+    def __init__(self, residuals: Residuals, robot: Robot, rng: np.random.Generator) -> None:
+        self.residuals, self.robot, self.rng = residuals, robot, rng
+        self.blocks = Blocks(residuals.index)
+        self._cache: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
+
+    def known(self) -> Model:
+        """Return the robot as it is known, with nothing fitted."""
+        return self._model((), np.zeros(0), NOTHING_TOLERATED)
+
+    def residual(
+        self, parameters: Parameters, tolerated: Array = NOTHING_TOLERATED
+    ) -> Callable[[Array], Array]:
+        """Return the function that fits minimise."""
+        return lambda z: self.residuals.errors(parameters.physics(z)) - tolerated
+
+    def fit(
+        self,
+        effects: Sequence[str],
+        values: Effects,
+        rounds: int = 10,
+        tolerated: Array = NOTHING_TOLERATED,
+    ) -> Model:
+        """Fit all parameters of some effects together, from given values."""
+        parameters = free(self.robot, effects)
+        residual = self.residual(parameters, tolerated)
+        start = parameters.vector(values)
+        found = least_squares(residual, start, parameters.bounds, parameters.probes, rounds)
+        energy = self.blocks.excess_energy(found.errors)
+        return Model(tuple(effects), parameters, found, energy, tolerated)
+
+    def tolerating(self, model: Model, tolerated: Array) -> Model:
+        """Return a model with something else subtracted from its residuals."""
+        errors = model.errors + model.tolerated - tolerated
+        found = Minimum(model.z, errors, cost(errors))
+        energy = self.blocks.excess_energy(errors)
+        return Model(model.effects, model.parameters, found, energy, tolerated)
+
+    def at(self, model: Model, z: Array) -> Model:
+        """Return a model at other coordinates."""
+        return self._model(model.effects, z, model.tolerated)
+
+    def searched(self, model: Model, spread: float = REFINED_SPREAD) -> Model:
+        """Search about a fit without derivatives; return the better one."""
+        parameters, residual = model.parameters, self.residual(model.parameters, model.tolerated)
+        wide = np.array([spread * c.parameter.search_spread for c in parameters.coordinates])
+        z, least = cma_es(lambda at: cost(residual(at)), model.z, wide, parameters.bounds, self.rng)
+        return model if least >= model.cost else self.at(model, z)
+
+    def sensitivities(self, model: Model, effect: str) -> Array:
+        """Return the residuals' derivatives by the parameters of an effect, the model's or one more, shape (n, k).
+
+        What is tolerated changes no derivative, so models with the same fit share theirs; those of the last few fits
+        are kept.
+        """
+        key = (model.effects, model.z.tobytes())
+        cached = self._cache.setdefault(key, {})
+        if effect not in cached:
+            cached[effect] = self._differences(model, effect)
+        while len(self._cache) > CACHED_FITS:
+            self._cache.pop(next(iter(self._cache)))
+        return cached[effect]
+
+    def own_sensitivities(self, model: Model) -> Array:
+        """Return the residuals' derivatives by a model's own parameters, shape (n, parameters)."""
+        columns = [self.sensitivities(model, effect) for effect in model.effects]
+        return np.concatenate([np.zeros((len(model.errors), 0)), *columns], axis=1)
+
+    def projected(self, model: Model, weighted: Array) -> Array:
+        """Project a model's own parameters out of weighted sensitivities, shape (n, k); what vanishes is dropped."""
+        own = self.own_sensitivities(model) * np.sqrt(weights(model.errors))[:, None]
+        if own.shape[1]:
+            basis = np.linalg.qr(own)[0]
+            weighted = weighted - basis @ (basis.T @ weighted)
+        kept: Array = weighted[:, np.sqrt(np.sum(weighted * weighted, axis=0)) > LEAST_NORM]
+        return kept
+
+    def linear_gain(self, model: Model, effect: str) -> float:
+        """Return the gain that sensitivities promise for one more effect: a score test.
+
+        Source: Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
+        """
+        w = np.sqrt(weights(model.errors))
+        g = self.projected(model, self.sensitivities(model, effect) * w[:, None])
+        if not g.shape[1]:
+            return 0.0
+        return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.errors)) ** 2))
+
+    def _model(self, effects: tuple[str, ...], z: Array, tolerated: Array) -> Model:
+        parameters = free(self.robot, effects)
+        errors = self.residual(parameters, tolerated)(z)
+        found = Minimum(z, errors, cost(errors))
+        return Model(effects, parameters, found, self.blocks.excess_energy(errors), tolerated)
+
+    def _differences(self, model: Model, effect: str) -> Array:
+        own = effect in model.effects
+        parameters = free(self.robot, model.effects if own else (*model.effects, effect))
+        z, high, residual = parameters.vector(model.values), parameters.bounds[1], self.residual(parameters)
+        raw = model.errors + model.tolerated
+        columns = []
+        for k, c in enumerate(parameters.coordinates):
+            if c.effect.id == effect:
+                moved = z.copy()
+                step = c.probe if z[k] + c.probe <= high[k] else -c.probe
+                moved[k] += step
+                columns.append((residual(moved) - raw) / step)
+        return np.stack(columns, axis=1)

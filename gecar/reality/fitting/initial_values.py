@@ -1,0 +1,195 @@
+"""Values of an effect's parameters from which fits of it start.
+
+Most effects are found from a few sizes on both sides of neutral, or from values their entry in the catalogue lists.
+Where the cost has many local minima, starting values are scanned: a slippery patch by place, a ripple by its cycles,
+a dead band by its edge. A replay of all recordings takes milliseconds, so that a scan may replay.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.parameters import Coordinate, free, torque_scale
+from gecar.reality.optimisation.least_squares import cost, weights
+from gecar.reality.recordings.recording import Recording
+from gecar.world.effects import BY_ID
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Values = Mapping[str, float]
+
+LEAST_CYCLES = 2.0
+SPEED_OVER_S = 0.1
+_SIZES = (3.0, 12.0)  # in steps worth a name
+PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
+PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
+
+
+def initial_values(
+    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> list[Values]:
+    """Return values of an effect's parameters to start from, by label.
+
+    Parameters
+    ----------
+    effect_id
+        Of the effect.
+    robot
+        As far as it is known.
+    recordings
+        Of that robot.
+    errors
+        Returns the residuals under the effect with given values.
+    """
+    effect = BY_ID[effect_id]
+    if effect.starts:
+        return list(effect.starts)
+    if effect.scan:
+        return list(_SCANS[effect.scan](robot, recordings, errors))
+    return list(_both_sides(effect_id, robot))
+
+
+def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
+    for c in free(robot, [effect_id]).coordinates:
+        for value in _sizes(c):
+            yield {c.parameter.label: value}
+
+
+def _sizes(c: Coordinate) -> Iterator[float]:
+    if c.parameter.worthwhile <= 0.0:
+        return
+    for z in _SIZES:
+        for side in (z, -z):
+            if c.parameter.low <= c.neutral + side * c.step <= c.parameter.high * c.scale:
+                yield c.value(side)
+
+
+def _slow_speeds(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
+    """Begin within the speeds recorded: above them breakaway friction is dry friction, and slopes lead nowhere.
+
+    Where no shaft was recorded turning, any speed will do.
+    """
+    top = max(_top_speed(r) for r in recordings) or math.inf
+    for speed, share in ((0.3, 0.25), (1.0, 0.5), (3.0, 1.0)):
+        for torque in (0.005, 0.02):
+            yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": min(speed, share * top)}
+
+
+def _top_speed(recording: Recording) -> float:
+    """Return the fastest a shaft turned over `SPEED_OVER_S` [rad/s]."""
+    every = max(int(np.searchsorted(recording.t_s, recording.t_s[0] + SPEED_OVER_S)), 1)
+    angles, t = _wheel_angles(recording)[::every], recording.t_s[::every]
+    return float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(t)[:, None], initial=0.0))
+
+
+def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
+    for duty in (2.0, 5.0, 10.0, 15.0, 20.0):
+        yield {"duty_pct": duty, "offset_share": 1.0}
+    levels = np.unique(np.abs(np.concatenate([r.commands.ravel() for r in recordings]))) * 100.0
+    edges = (levels[1:] + levels[:-1]) / 2.0
+    edges = edges[(edges > 1.0) & (edges < 40.0)]
+    for edge in edges[np.unique(np.linspace(0, len(edges) - 1, 12).astype(int))] if len(edges) else ():
+        yield {"duty_pct": float(edge), "offset_share": 0.0}
+
+
+def _shaft_cycles(
+    robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> Iterator[Values]:
+    """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
+
+    Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
+    either shaft do, and least squares gives both phases at once.
+    """
+    turned = max(_turned(r, robot) for r in recordings)
+    size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
+    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
+    w, least = np.sqrt(weights(bare)), cost(bare)
+    for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
+        if cycles * turned < LEAST_CYCLES:
+            continue
+        pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
+        sines, sine, cosines, cosine = (w * (errors(_rippled(cycles, *p, size)) - bare) for p in pairs)
+        basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
+        a, b, c, d = -np.linalg.lstsq(basis, w * bare, rcond=None)[0]
+        most = size * max(math.hypot(a, b), math.hypot(c, d))
+        phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
+        # Least squares asks for too little: a ripple runs out of step with the simulation.
+        for share in (1.0, 2.0, 4.0):
+            found, opposite = (_rippled(cycles, *pair, share * most) for pair in phases)
+            gain, other = (least - cost(errors(values)) for values in (found, opposite))
+            if other < PHASE_COUNTS * gain:
+                yield found
+
+
+def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[str, float]:
+    lead = math.remainder(right - left, math.tau) / cycles
+    return {
+        "amplitude_nm": amplitude,
+        "cycles_per_rev": float(cycles),
+        "phase_rad": left,
+        "right_lead_rad": lead,
+    }
+
+
+def _turned(recording: Recording, robot: Robot) -> float:
+    """Return how far a shaft has turned at least [revolutions], by its angles or else by the path."""
+    angles = np.ptp(_wheel_angles(recording), axis=0).max()
+    path = np.column_stack([recording.x_m, recording.y_m])
+    driven = np.hypot(*np.diff(path[~np.isnan(path).any(axis=1)], axis=0).T).sum()
+    return float(angles or driven / robot.physics["wheel_radius"][0]) / math.tau
+
+
+def _wheel_angles(recording: Recording) -> Array:
+    """Return the wheel angles [rad] without gaps, shape (rows, 2); 0 where there are none."""
+    return np.nan_to_num(np.column_stack([recording.left_angle_rad, recording.right_angle_rad]))
+
+
+def _floor_cells(recordings: Sequence[Recording], errors: Callable[[Values], Array]) -> Iterator[Values]:
+    """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
+    places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
+    if not len(places):
+        return
+    cells = np.unique(np.round(places / PATCH_PITCH_M).astype(int), axis=0) * PATCH_PITCH_M
+    cells = cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))]
+    tried = [{"radius_m": 0.1, "x_m": float(x), "y_m": float(y), "coefficient": 0.15} for x, y in cells]
+    tried.sort(key=lambda values: cost(errors(values)))
+    half = 0.5 * PATCH_PITCH_M
+    for values, radius, grip in itertools.product(
+        tried[:BEST_CELLS], (0.1, 0.15, 0.2, 0.3), (0.06, 0.15, 0.3)
+    ):
+        for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
+            yield {
+                "radius_m": radius,
+                "coefficient": grip,
+                "x_m": values["x_m"] + dx,
+                "y_m": values["y_m"] + dy,
+            }
+
+
+def _top_speeds(robot: Robot) -> Iterator[Values]:
+    top = robot.battery.voltage / max(robot.motor.back_emf_constant, 1e-3) * robot.drive.duty_cap
+    for share in (0.92, 0.8, 0.65, 0.5):
+        yield {"speed_rad_s": max(share * top, BY_ID["speed_limit"].parameters[0].low)}
+
+
+def _mounts(robot: Robot) -> Iterator[Values]:
+    sensor = robot.colour_sensor
+    for ahead in (-0.02, -0.01, 0.0, 0.01, 0.02):
+        for left in (-0.02, -0.01, 0.0, 0.01, 0.02):
+            yield {"ahead_m": max(sensor.ahead + ahead, 0.0), "left_m": sensor.left + left}
+
+
+Scan = Callable[[Robot, Sequence[Recording], Callable[[Values], Array]], Iterable[Values]]
+_SCANS: dict[str, Scan] = {
+    "slow speeds": lambda robot, recordings, errors: _slow_speeds(robot, recordings),  # noqa: ARG005
+    "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
+    "shaft cycles": _shaft_cycles,
+    "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
+    "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot),  # noqa: ARG005
+    "around the mount": lambda robot, recordings, errors: _mounts(robot),  # noqa: ARG005
+}

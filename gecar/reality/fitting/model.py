@@ -1,0 +1,113 @@
+"""A robot with some effects fitted, and one effect tried on top of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.parameters import Parameters
+from gecar.reality.optimisation.least_squares import Minimum
+
+Array = npt.NDArray[np.float64]
+Effects = Mapping[str, Mapping[str, float]]
+
+NOTHING_TOLERATED = np.zeros(1)
+
+
+@dataclass(frozen=True)
+class Model:
+    """The robot with some effects fitted.
+
+    Attributes
+    ----------
+    effects
+        Identifiers, in the order they were taken.
+    parameters
+        Their free parameters.
+    minimum
+        Where the fit ended.
+    excess_energy
+        Energy of the residuals' block means above noise.
+    tolerated
+        What changes too small for a name explain, subtracted from the residuals; shape (n,) or (1,).
+    """
+
+    effects: tuple[str, ...]
+    parameters: Parameters
+    minimum: Minimum
+    excess_energy: float
+    tolerated: Array = field(default_factory=lambda: NOTHING_TOLERATED)
+
+    @property
+    def values(self) -> dict[str, dict[str, float]]:
+        """Parameters' values as in a robot file."""
+        return self.parameters.values(self.minimum.z)
+
+    @property
+    def physics(self) -> npt.NDArray[Any]:
+        """Physics record, shape (1,)."""
+        return self.parameters.physics(self.minimum.z)
+
+    @property
+    def z(self) -> Array:
+        """Coordinates, shape (k,)."""
+        return self.minimum.z
+
+    @property
+    def errors(self) -> Array:
+        """Whitened residuals, less what is tolerated, shape (n,)."""
+        return self.minimum.errors
+
+    @property
+    def cost(self) -> float:
+        """Robust cost of the residuals."""
+        return self.minimum.cost
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect tried on top of a model.
+
+    Attributes
+    ----------
+    effect
+        Its identifier.
+    base, model
+        The model without and with it, both rid of what changes too small for a name explain.
+    gain
+        What it lowers the cost by.
+    left_out
+        What it lowers the cost of left-out recordings by, one number a recording.
+    null_95, p
+        The null distribution's 95 % quantile, and the share of null draws that gain as much.
+    worthwhile
+        Whether its size is worth a name.
+    energy_before, energy_after
+        Excess energy without and with it, by the same measure.
+    stage
+        At which stage of a chain it was tried, from 0.
+    holdout_gain
+        What it lowers the cost of the recordings set aside by, against the others refitted without it.
+    """
+
+    effect: str
+    base: Model
+    model: Model
+    gain: float
+    left_out: Array = field(default_factory=lambda: np.zeros(0))
+    null_95: float = np.nan
+    p: float = np.nan
+    worthwhile: bool = False
+    energy_before: float = 0.0
+    energy_after: float = 0.0
+    stage: int = 0
+    holdout_gain: float = np.nan
+
+    @property
+    def drop(self) -> float:
+        """By how much it lowers the excess energy."""
+        return self.energy_before - self.energy_after

@@ -1,0 +1,1 @@
+"""A description, in state variables, of what nothing in the catalogue explains."""

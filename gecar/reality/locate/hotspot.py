@@ -1,0 +1,50 @@
+"""Hotspots: excess energy at one place on the floor, too little to count beside all that was driven elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.model import Model
+from gecar.reality.replay.kernel import X, Y
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.thresholds import HOTSPOT
+
+Array = npt.NDArray[np.float64]
+
+CELL_M = 0.1
+MOST_OF_A_BLOCK = 60.0  # one wild frame is no place
+LEAST_BLOCKS = 10
+
+
+def hotspot(problem: Problem, model: Model) -> tuple[float, float] | None:
+    """Return the place [m] at which a model of motion leaves excess energy; None if there is none, or no poses."""
+    score, place = strongest_place(problem, model)
+    return place if score >= HOTSPOT else None
+
+
+def strongest_place(problem: Problem, model: Model) -> tuple[float, tuple[float, float]]:
+    """Return the largest excess energy in a cell of the floor, in standard deviations of noise, and where."""
+    cells = _cells(problem, model)
+    there = ~np.isnan(cells[:, 0])
+    if not there.any():
+        return 0.0, (np.nan, np.nan)
+    excess = np.minimum(problem.estimator.blocks.excess_by_block(model.errors)[there], MOST_OF_A_BLOCK)
+    places, of = np.unique(cells[there], axis=0, return_inverse=True)
+    count = np.bincount(of.ravel())
+    scores = np.where(count >= LEAST_BLOCKS, np.bincount(of.ravel(), excess) / np.sqrt(2.0 * count), 0.0)
+    best = int(np.argmax(scores))
+    x, y = (places[best] + 0.5) * CELL_M
+    return max(float(scores[best]), 0.0), (float(x), float(y))
+
+
+def _cells(problem: Problem, model: Model) -> Array:
+    """Return the cell of the floor the robot was in at each block, shape (blocks, 2); nan where no camera looked."""
+    blocks, physics = problem.estimator.blocks, model.physics
+    cells = np.full((blocks.count, 2), np.nan)
+    for number, run in enumerate(problem.residuals.recordings):
+        if run.replayer.has_poses:
+            rows, own = run.replayer.play(physics).rows, blocks.recording == number
+            for k, column in enumerate((X, Y)):
+                cells[own, k] = np.floor(np.interp(blocks.t_s[own], run.replayer.t, rows[:, column]) / CELL_M)
+    return cells

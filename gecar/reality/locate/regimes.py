@@ -1,0 +1,94 @@
+"""Regimes of motion: from rest, reversing, fast, turning and so on, as masks over a case's recordings and times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.replay.kernel import AHEAD, HEADING, LEFT_SPEED, RIGHT_SPEED, YAW_RATE, X, Y
+from gecar.reality.residuals.of_recording import RecordingResiduals
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+AFTER_S = 0.4  # how long an event has an effect
+RESTING, SLOW_SHARE, FAST_SHARE = 0.15, 0.35, 0.7  # rad/s, and shares of the fastest shaft speed
+SMALL_DUTY, STEP = 0.25, 0.15
+TURNING, STRAIGHT = 1.5, 0.25  # rad/s
+
+
+def regime_masks(
+    runs: Sequence[RecordingResiduals], physics: npt.NDArray[Any], bins: int, bin_s: float
+) -> tuple[dict[str, Mask], Array]:
+    """Return regimes by name, each of shape (recordings, bins), and the path, shape (recordings, bins, 2) [m]."""
+    tables = [_table(run, physics, bins, bin_s) for run in runs]
+    names = tables[0][0].keys()
+    masks = {name: np.stack([table[0][name] for table in tables]) for name in names}
+    return masks, np.stack([table[1] for table in tables])
+
+
+def _table(
+    run: RecordingResiduals, physics: npt.NDArray[Any], bins: int, bin_s: float
+) -> tuple[dict[str, Mask], Array]:
+    rows, t = run.replayer.play(physics)[0], run.replayer.t
+    sensor_path, located = run.nuisances.path, run.nuisances.start is not None
+    pose = sensor_path.poses if located and sensor_path is not None else rows[:, [X, Y, HEADING]]
+    placed = located or run.replayer.has_poses
+    centres = (np.arange(bins) + 0.5) * bin_s
+    at = np.minimum(np.searchsorted(t, centres), len(t) - 1)
+    there = centres <= t[-1]
+    masks = _motions(rows[at], run.recording.commands[at], max(int(AFTER_S / bin_s), 1))
+    masks["early"], masks["late"] = centres < t[-1] / 3.0, centres > 2.0 * t[-1] / 3.0
+    for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
+        masks[name] = (np.cos(pose[at, 2] - way * np.pi) > np.sqrt(0.5)) & ~masks["standing"] & placed
+    masks["on the line's edge"] = _edges(run, physics, at) if run.reads else np.zeros(bins, bool)
+    path = np.where(there[:, None] & placed, pose[at, :2], np.nan)
+    return {name: mask & there for name, mask in masks.items()}, path
+
+
+def _motions(rows: Array, duty: Array, lasting: int) -> dict[str, Mask]:
+    """Return regimes that the motion and the commands themselves tell, by name; an event lasts for so many bins."""
+    left, right, yaw, ahead = (rows[:, k] for k in (LEFT_SPEED, RIGHT_SPEED, YAW_RATE, AHEAD))
+    fastest = max(float(np.abs(rows[:, [LEFT_SPEED, RIGHT_SPEED]]).max()), 1e-9)
+    speed = np.maximum(np.abs(left), np.abs(right))
+    moving = speed > RESTING
+    stepped = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1) > STEP
+    return {
+        "from rest": _after(_risen(moving), lasting),
+        "reversal": _after(_turned(left) | _turned(right), lasting),
+        "change of command": _after(stepped, lasting),
+        "steady": ~_after(stepped, lasting) & moving,
+        "standing": ~moving,
+        "slow": moving & (speed < SLOW_SHARE * fastest),
+        "fast": speed > FAST_SHARE * fastest,
+        "small duty": (np.abs(duty).max(axis=1) < SMALL_DUTY) & (np.abs(duty).max(axis=1) > 0.0),
+        "turning": np.abs(yaw) > TURNING,
+        "straight": (np.abs(yaw) < STRAIGHT) & moving,
+        "forward": ahead > 0.02,
+        "backward": ahead < -0.02,
+    }
+
+
+def _after(event: Mask, length: int) -> Mask:
+    return np.convolve(event, np.ones(length))[: len(event)] > 0
+
+
+def _risen(mask: Mask) -> Mask:
+    return mask & ~np.r_[False, mask[:-1]]
+
+
+def _turned(speed: Array) -> Mask:
+    """Return where a speed has changed its sign since it last was more than rest."""
+    sign = np.where(np.abs(speed) > RESTING, np.sign(speed), 0.0)
+    known = np.maximum.accumulate(np.where(sign != 0.0, np.arange(len(sign)), 0))
+    held = sign[known]
+    return np.r_[False, held[1:] * held[:-1] < 0.0]
+
+
+def _edges(run: RecordingResiduals, physics: npt.NDArray[Any], at: npt.NDArray[np.intp]) -> Mask:
+    readings = run.readings(physics)
+    slope = np.abs(np.gradient(readings))
+    return np.convolve(slope, np.ones(9), "same")[at] > 10.0

@@ -1,0 +1,1 @@
+"""What the sensors' noise alone does to recordings, and what residuals hold beyond it."""

@@ -1,0 +1,115 @@
+"""Excess energy: what the means of residuals over short blocks hold beyond what noise would leave."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.replay.channels import CHANNELS, ENCODERS, REFLECTION, ResidualIndex
+
+Array = npt.NDArray[np.float64]
+
+BLOCK_S = 0.15  # over which residuals are averaged
+SPAN_S = 0.5  # spans whose signs the null distribution draws
+WHITE = (*ENCODERS, REFLECTION)  # channels whose noise is white: encoders round, readings are mostly clipped
+CHI_SQUARE_MEDIAN = 0.455  # of a chi-square with one degree of freedom
+LARGEST_INFLATION = 6.0  # noise correlated over a whole block
+CLIP = 30.0
+
+
+class Blocks:
+    """Residuals grouped by recordings, spans and blocks of time.
+
+    Attributes
+    ----------
+    folds
+        What is left out together, shape (n,).
+    spans
+        Half-second spans, shape (n,).
+    count
+        Number of blocks.
+    samples
+        Samples in each, shape (count,).
+    recording, t_s
+        Where each lies, and its middle [s], shape (count,).
+    """
+
+    def __init__(self, index: ResidualIndex) -> None:
+        self.folds = _folds(index)
+        self.spans = _group(index, SPAN_S)
+        self._of = _group(index, BLOCK_S)
+        self.count = int(self._of.max()) + 1 if len(self._of) else 0
+        self.samples = np.bincount(self._of, minlength=self.count)
+        self._channel = np.zeros(self.count, np.int64)
+        self._channel[self._of] = index.channel
+        self.recording = np.zeros(self.count, np.int64)
+        self.recording[self._of] = index.recording
+        self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
+
+    def excess_energy(self, errors: Array, inflation: Array | None = None) -> float:
+        """Return the energy of block means above what noise would leave.
+
+        Parameters
+        ----------
+        errors
+            Whitened residuals.
+        inflation
+            As `inflation` returns it; default: that of these residuals.
+        """
+        return float(np.sum(self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), inflation)))
+
+    def excess_by_block(self, errors: Array) -> Array:
+        """Return each block's excess energy, in variances of its mean, shape (blocks,); 0 on average for noise."""
+        return self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), None)
+
+    def excess_energy_of_sums(self, sums: Array) -> float:
+        """Return the excess energy of residuals of which only each block's sum is known, shape (blocks,)."""
+        return float(np.sum(self._above(self._energy(sums), None)))
+
+    def sums(self, values: Array) -> Array:
+        """Return each block's sum of values, shape (blocks,)."""
+        return np.bincount(self._of, values, self.count).astype(float)
+
+    def inflation(self, errors: Array) -> Array:
+        """Return the variance inflation of each channel's block means, shape (channels,); 1 for white noise.
+
+        Correlated noise of a sensor shows in every block, missing physics in some. So the typical (median) block tells
+        the noise. Encoders round, and the colour sensor mostly reads even floor, clipped: theirs is taken for white.
+        """
+        return self._inflation(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))))
+
+    def _above(self, energy: Array, inflation: Array | None) -> Array:
+        expected = (self._inflation(energy) if inflation is None else inflation)[self._channel]
+        above: Array = energy / expected - 1.0
+        return above
+
+    def _inflation(self, energy: Array) -> Array:
+        out = np.ones(len(CHANNELS))
+        for channel in np.unique(self._channel):
+            if channel not in WHITE:
+                typical = np.median(energy[self._channel == channel]) / CHI_SQUARE_MEDIAN
+                out[channel] = np.clip(typical, 1.0, LARGEST_INFLATION)
+        return out
+
+    def _energy(self, sums: Array) -> Array:
+        return sums**2 / self.samples
+
+
+def _folds(index: ResidualIndex) -> npt.NDArray[np.int32]:
+    """Return what is left out together: recordings, or thirds of the time where there are too few."""
+    if len(index.recording) and index.recording.max() >= 2:
+        return index.recording
+    if not len(index.t_s):
+        return np.zeros(0, np.int32)
+    third = np.minimum((3.0 * index.t_s / max(index.t_s.max(), 1e-9)).astype(np.int32), 2)
+    return (3 * index.recording + third).astype(np.int32)
+
+
+def _group(index: ResidualIndex, length_s: float) -> npt.NDArray[np.int64]:
+    """Return each residual's block of a length, by recording and channel."""
+    if not len(index.t_s):
+        return np.zeros(0, np.int64)
+    key = (index.recording.astype(np.int64) * 16 + index.channel) * 10_000_000 + (
+        index.t_s / length_s
+    ).astype(np.int64)
+    return np.unique(key, return_inverse=True)[1]

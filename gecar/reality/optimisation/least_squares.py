@@ -1,0 +1,124 @@
+"""Bounded robust least squares: Levenberg-Marquardt on whitened residuals, with derivatives by finite differences.
+
+Large residuals count linearly (pseudo-Huber loss), so that a wheel that slips a moment too late does not dominate.
+
+Sources: Levenberg-Marquardt, Nocedal and Wright, Numerical Optimization (2nd ed.), ch. 10; pseudo-Huber by
+reweighting, Hartley and Zisserman, Multiple View Geometry (2nd ed.), appendix 6.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+KNEE = 4.0  # standard deviations beyond which a residual counts linearly
+
+
+def cost(errors: Array) -> float:
+    """Return the robust cost of whitened residuals; half their squares where they are small."""
+    return float(np.sum(costs(errors)))
+
+
+def costs(errors: Array) -> Array:
+    """Return each residual's share of the cost."""
+    return KNEE**2 * (np.sqrt(1.0 + (errors / KNEE) ** 2) - 1.0)
+
+
+def weights(errors: Array) -> Array:
+    """Return the weights that make squares behave as the robust cost does."""
+    return 1.0 / np.sqrt(1.0 + (errors / KNEE) ** 2)
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a minimisation ended.
+
+    Attributes
+    ----------
+    z
+        Coordinates, shape (k,).
+    errors
+        Whitened residuals there, shape (n,).
+    cost
+        Robust cost.
+    """
+
+    z: Array
+    errors: Array
+    cost: float
+
+
+def jacobian(
+    residual: Callable[[Array], Array], z: Array, errors: Array, probes: Array, high: Array
+) -> Array:
+    """Return forward differences, backward where a bound is near, shape (n, k)."""
+    columns = np.empty((len(errors), len(z)))
+    for k in range(len(z)):
+        step = probes[k] if z[k] + probes[k] <= high[k] else -probes[k]
+        moved = z.copy()
+        moved[k] += step
+        columns[:, k] = (residual(moved) - errors) / step
+    return columns
+
+
+def least_squares(
+    residual: Callable[[Array], Array],
+    start: Array,
+    bounds: tuple[Array, Array],
+    probes: Array,
+    rounds: int = 12,
+    close: float = 1e-3,
+) -> Minimum:
+    """Minimise the robust cost of a residual function.
+
+    Parameters
+    ----------
+    residual
+        Whitened residuals at a vector.
+    start, bounds
+        Where to start, and the lowest and highest vectors.
+    probes
+        Steps of finite differences.
+    rounds
+        Most Jacobians to take.
+    close
+        Stop when a round lowers the cost by less than this share of it, and by less than 0.05.
+    """
+    low, high = bounds
+    z = np.clip(start, low, high)
+    errors = residual(z)
+    now = cost(errors)
+    damping = 1e-3
+    for _ in range(rounds):
+        slopes = jacobian(residual, z, errors, probes, high)
+        w = weights(errors)[:, None]
+        normal, gradient = slopes.T @ (w * slopes), slopes.T @ (w[:, 0] * errors)
+        before = now
+        for _ in range(7):
+            candidate = _step(z, normal, gradient, damping, low, high)
+            if np.allclose(candidate, z, rtol=0.0, atol=1e-6):
+                break
+            tried = residual(candidate)
+            if cost(tried) < now:
+                z, errors, now = candidate, tried, cost(tried)
+                damping = max(damping * 0.2, 1e-6)
+                break
+            damping *= 6.0
+        if before - now < max(close * 1e-2 * before, 0.02):
+            break
+    return Minimum(z, errors, now)
+
+
+def _step(z: Array, normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
+    """Return the next vector; coordinates at an active bound stay there."""
+    free = ~(((z <= low) & (gradient > 0.0)) | ((z >= high) & (gradient < 0.0)))
+    move = np.zeros_like(z)
+    if free.any():
+        block = normal[np.ix_(free, free)]
+        scale = np.maximum(np.diag(block), 1e-9)
+        move[free] = -np.linalg.solve(block + damping * np.diag(scale), gradient[free])
+    return np.clip(z + move, low, high)

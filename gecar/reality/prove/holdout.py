@@ -1,0 +1,115 @@
+"""What a robot is worth on recordings set aside: whole replays, open loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.noise.sensor_noise import PATH_CAUTION, Noise
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.replay.replayer import Replayer, replayer_of
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.verdict import Misfit
+from gecar.world.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Correction = Callable[[Replayer, Array, Array], tuple[Array, Array]]  # of a replay's rows and poses
+
+_FIELDS = tuple(
+    (field, column)
+    for column, (field, _) in COLUMNS.items()
+    if field not in ("t_s", "left_duty", "right_duty")
+)
+_ROW = {"left_angle_rad": 0, "right_angle_rad": 1, "battery_v": 2, "yaw_rate_rad_s": 3}
+_POSE = {"x_m": 0, "y_m": 1, "heading_rad": 2}
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A robot, and the recordings set aside with the nuisances fitted under it.
+
+    Attributes
+    ----------
+    robot
+        Is judged.
+    held
+        The recordings beside their simulation: clocks and paths as this robot gives them.
+    correction
+        Applied to its replays: a formula added, for instance.
+    """
+
+    robot: Robot
+    held: Residuals
+    correction: Correction | None = None
+
+
+def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
+    """Compare two robots on recordings neither was fitted to, whole and open loop, by column of the file.
+
+    Each is judged with its own nuisances. The floor is what noise leaves, and on readings the uncertainty of the first
+    robot's path: it is known before anything is fitted.
+    """
+    floors = _floors(before.held) if before.held.recordings else {}
+    was, now = _errors_by_field(before), _errors_by_field(after)
+    out = {}
+    for field, column in _FIELDS:
+        if field in was and field in now:
+            deviation = max(_rms(_deviations(before.held, field)), 1e-12)
+            sizes = (_rms(was[field]), _rms(now[field]), float(floors[field]))
+            out[column] = Misfit(*(size / deviation for size in sizes))
+    return out
+
+
+def _errors_by_field(contender: Contender) -> dict[str, Array]:
+    """Return measured less simulated over all recordings, by field of a recording."""
+    errors: dict[str, list[Array]] = {}
+    for run in contender.held.recordings:
+        for field, values in _errors(run, contender.robot, contender.correction).items():
+            if not np.isnan(getattr(run.recording, field)).all():
+                errors.setdefault(field, []).append(values)
+    return {field: np.concatenate(parts) for field, parts in errors.items()}
+
+
+def _deviations(held: Residuals, field: str) -> Array:
+    """Return what was measured, less its mean, over all recordings that have it."""
+    runs = (run for run in held.recordings if field != "reflection_pct" or run.reads)
+    values = (getattr(run.recording, field) for run in runs)
+    return np.concatenate([v - np.nanmean(v) for v in values if not np.isnan(v).all()])
+
+
+def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None) -> dict[str, Array]:
+    recording, physics = run.recording, robot.physics
+    replayer = replayer_of(recording, run.noise.sd).with_clock(run.nuisances.clock_offset_s)
+    rows, _, poses, _ = replayer.play(physics, replayer.aligned_start(physics))
+    if correction is not None:
+        rows, poses = correction(replayer, rows, poses)
+    out = {f: getattr(recording, f) - rows[:, k] for f, k in _ROW.items()}
+    for field, k in _POSE.items():
+        out[field] = replayer.inputs.pose[:, k] - poses[:, k]
+    if run.reads:
+        out["reflection_pct"] = recording.reflection_pct - run.readings(physics)
+    return out
+
+
+def _floors(held: Residuals) -> dict[str, float]:
+    """Return what noise leaves by field; of a reading also what the path's own uncertainty leaves."""
+    noise: Noise = held.recordings[0].noise
+    angle, battery, rate, place, heading = noise.sd
+    paths = [run.nuisances.path for run in held.recordings if run.reads]
+    deviations = [path.reading_sd for path in paths if path is not None]
+    own = noise.reflection_sd
+    # Fits take the path for less certain than it is; the floor is what it is.
+    variances = [own**2 + (sd**2 - own**2) / PATH_CAUTION**2 for sd in deviations]
+    reading = float(np.sqrt(np.nanmean(np.concatenate(variances)))) if variances else own
+    return {
+        "left_angle_rad": angle, "right_angle_rad": angle, "battery_v": battery, "yaw_rate_rad_s": rate,
+        "x_m": place, "y_m": place, "heading_rad": heading, "reflection_pct": reading,
+    }  # fmt: skip
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))

@@ -1,0 +1,70 @@
+"""Recordings set aside before anything else: fitted to by nothing, judged on by everything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gecar.errors import expected
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.recording import Case, Recording
+
+EVERY = 4  # one recording in so many is set aside
+FIRST_SHARE = 0.7  # of a single recording's time is fitted on
+
+
+@dataclass(frozen=True)
+class Split:
+    """What is fitted on, and what is set aside.
+
+    Attributes
+    ----------
+    fitted, held
+        Recordings.
+    by_time
+        Whether the last part of the only recording is set aside.
+    """
+
+    fitted: tuple[Recording, ...]
+    held: tuple[Recording, ...]
+    by_time: bool = False
+
+
+def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
+    """Set recordings aside: those named, or every fourth counted from the last, or the end of the only one.
+
+    Raises
+    ------
+    InputError
+        If a name is no recording of the case, or nothing is left to fit on.
+    """
+    wanted = {name.removesuffix(".csv") for name in names if name}
+    known = [r.name for r in case.recordings]
+    for name in sorted(wanted):
+        if name not in known:
+            raise expected("--holdout", f"'{name}'", f"one of {', '.join(known)}")
+    if not wanted and len(known) == 1:
+        return _by_time(case.recordings[0])
+    if not wanted:
+        wanted = set(known[::-1][::EVERY]) if len(known) >= EVERY else {known[-1]}
+    fitted = tuple(r for r in case.recordings if r.name not in wanted)
+    if not fitted:
+        raise expected("--holdout", "all recordings", "at least one left to fit on")
+    return Split(fitted, tuple(r for r in case.recordings if r.name in wanted))
+
+
+def _by_time(recording: Recording) -> Split:
+    cut = recording.t_s[0] + FIRST_SHARE * recording.duration_s
+    first = recording.t_s <= cut
+    early, late = recording, recording
+    for field, _ in COLUMNS.values():
+        values = getattr(recording, field)
+        kept: dict[str, Any] = {field: values[first]}
+        early = replace(early, **kept)
+        if field not in ("t_s", "left_duty", "right_duty"):
+            blanked: dict[str, Any] = {field: np.where(first, np.nan, values)}
+            late = replace(late, **blanked)
+    return Split((early,), (late,), by_time=True)

@@ -1,0 +1,106 @@
+"""What the colour sensor would have read along a path the robot was measured to take.
+
+Along the measured path, not the simulated one: then only the sensor and the course can explain a difference.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import compiled
+from gecar.world.sensing import spot_reflection
+
+Array = npt.NDArray[np.float64]
+
+
+@compiled
+def _along(t: Array, path: Array, at: float, k: int, pose: Array) -> int:
+    """Interpolate a path at a time, holding its ends; return the row it was found at, to search on from."""
+    last = t.shape[0] - 1
+    while k < last - 1 and t[k + 1] < at:
+        k += 1
+    while k > 0 and t[k] > at:
+        k -= 1
+    share = min(max((at - t[k]) / (t[k + 1] - t[k]), 0.0), 1.0)
+    for i in range(3):
+        pose[i] = (1.0 - share) * path[k, i] + share * path[k + 1, i]
+    return k
+
+
+@compiled
+def _clipped_mean(level: float, sd: float) -> float:
+    """Return the mean of a reading with normal noise after it is clipped to 0..100.
+
+    Readings at the ends can only err inwards; without this, white at 100 % fakes a sensor gain below 1.
+    """
+    total = level
+    for bound, side in ((0.0, -1.0), (100.0, 1.0)):
+        z = side * (level - bound) / sd
+        if z > -6.0:
+            upper = 0.5 * math.erfc(-z / math.sqrt(2.0))
+            total -= side * sd * (z * upper + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
+    return total
+
+
+@compiled
+def readings_along(
+    t: Array,
+    path: Array,
+    late: float,
+    noise: float,
+    raster: npt.NDArray[np.uint8],
+    pitch: float,
+    physics: npt.NDArray[Any],
+    shift: Array,
+    readings: Array,
+) -> None:
+    """Predict the reflection at every row.
+
+    Parameters
+    ----------
+    t, path
+        Times [s], shape (rows,), and poses of the axle's centre [m, m, rad], shape (rows, 3).
+    late
+        How much later than the sensor's clock the path's is [s].
+    noise
+        Standard deviation of a reading [%].
+    raster, pitch
+        The floor, as in `gecar.world.sensing.spot_reflection`.
+    physics
+        Record of dtype `PHYSICS`, shape (1,).
+    shift
+        Moves the whole path [m, m, rad], shape (3,): to see how much a pose's error matters.
+    readings
+        Overwritten [%], shape (rows,).
+    """
+    p = physics[0]
+    pose = np.zeros(3)
+    k = 0
+    before = now = 0.0
+    for i in range(t.shape[0]):
+        k = _along(t, path, t[i] + late - p.sensor_delay, k, pose)
+        heading = pose[2] + shift[2]
+        seen = spot_reflection(
+            raster,
+            pitch,
+            pose[0] + shift[0],
+            pose[1] + shift[1],
+            math.cos(heading),
+            math.sin(heading),
+            0.0,
+            p,
+        )
+        if i == 0 or p.sensor_lag <= 0.0:
+            now = seen
+        else:
+            # What is seen runs straight from row to row: a first-order lag's exact answer to a ramp.
+            elapsed = t[i] - t[i - 1]
+            keep = math.exp(-elapsed / p.sensor_lag)
+            slope = (seen - before) / elapsed
+            now = seen - slope * p.sensor_lag + (now - before + slope * p.sensor_lag) * keep
+        before = seen
+        readings[i] = _clipped_mean(p.sensor_gain * now + p.sensor_offset, noise)

@@ -1,0 +1,243 @@
+"""Replay a recording: its commands, open loop, through the simulated robot.
+
+replay(recording, robot)               # whole, open loop, from the recorded start
+replay(recording, robot, memory_s=1)   # re-based on the measurement, over about a second
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+from gecar.reality.recordings.camera_frame import axle_pose
+from gecar.reality.recordings.recording import Recording
+from gecar.reality.replay.kernel import ROW_COLUMNS, KernelInput, replay_rows
+from gecar.world.robot import Robot
+from gecar.world.rollout import STEP_S
+from gecar.world.state import DERIVED, STATE
+
+Array = npt.NDArray[np.float64]
+DEG = np.pi / 180.0
+# What replays assume where a recording says nothing: whole degrees, 10 mV, 0.5 deg/s, 1 mm, 0.3 deg.
+USUAL_NOISE = (0.29 * DEG, 0.01, 0.5 * DEG, 0.001, 0.3 * DEG)
+USUAL_WALK = (3e-4, 0.1 * DEG)  # m/sqrt(s), rad/sqrt(s)
+# A command acts from the log's zero where its first row comes at most this much later.
+LATEST_FIRST_ROW_S = 0.1
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What the simulated robot did under a recording's commands; every series at the recording's rows.
+
+    Attributes
+    ----------
+    t_s
+        The recording's times [s], shape (rows,).
+    left_angle_rad, right_angle_rad, battery_v, yaw_rate_rad_s
+        What the sensors would have read, shape (rows,).
+    x_m, y_m, heading_rad
+        Pose of the axle's centre, shape (rows,).
+    left_speed_rad_s, right_speed_rad_s, ahead_m_s, aside_m_s
+        Speeds of the shafts, and of the axle's centre ahead and to the left, shape (rows,).
+    """
+
+    t_s: Array
+    left_angle_rad: Array
+    right_angle_rad: Array
+    battery_v: Array
+    yaw_rate_rad_s: Array
+    x_m: Array
+    y_m: Array
+    heading_rad: Array
+    left_speed_rad_s: Array
+    right_speed_rad_s: Array
+    ahead_m_s: Array
+    aside_m_s: Array
+
+
+class Prediction(NamedTuple):
+    """What a replay predicts, and how far measurements are off.
+
+    Attributes
+    ----------
+    rows
+        One row of predictions for each of the recording's, columns as in `kernel`, shape (rows, ROW_COLUMNS).
+    row_errors
+        Normalised residuals of encoders, battery and gyro, shape (rows, 4).
+    poses, pose_errors
+        Predicted poses [m, m, rad] and their normalised residuals, shape (poses, 3).
+    """
+
+    rows: Array
+    row_errors: Array
+    poses: Array
+    pose_errors: Array
+
+
+@dataclass(frozen=True)
+class Replayer:
+    """A recording made ready to be replayed under any physics; make it with `replayer_of`.
+
+    Attributes
+    ----------
+    recording
+        What is replayed.
+    inputs
+        The recording as the kernel reads it.
+    poses_seen
+        Poses as recorded, before any correction of the camera's mark, shape (poses, 3) [m, m, rad].
+    start
+        First pose, shape (3,) [m, m, rad]; 0 where none was recorded.
+    clock_offset_s
+        How late the camera's clock is [s].
+    """
+
+    recording: Recording
+    inputs: KernelInput
+    poses_seen: Array
+    start: Array
+    clock_offset_s: float = 0.0
+
+    @property
+    def first_row(self) -> int:
+        """The row of the kernel's input at which the recording begins."""
+        return len(self.inputs.t) - len(self.recording.t_s)
+
+    @property
+    def t(self) -> Array:
+        """Times of the rows from the start of the simulation [s], shape (rows,)."""
+        return self.inputs.t[self.first_row :]
+
+    @property
+    def measured(self) -> Array:
+        """Left angle, right angle [rad], battery [V], yaw rate [rad/s] at every row, shape (rows, 4)."""
+        return self.inputs.measured[self.first_row :]
+
+    @property
+    def has_poses(self) -> bool:
+        """Whether a camera saw the robot at all."""
+        return len(self.inputs.pose_t) > 0
+
+    def with_clock(self, offset_s: float) -> Replayer:
+        """Return this with a camera clock that is late by so much [s]."""
+        return replace(self, clock_offset_s=offset_s)
+
+    def with_mark(self, mark: Sequence[float] | Array) -> Replayer:
+        """Return this with the poses taken for those of a mark on the robot; see `axle_pose`."""
+        pose = axle_pose(self.poses_seen, mark)
+        return replace(self, inputs=self.inputs._replace(pose=pose), start=_first_pose(pose))
+
+    def open_loop(self) -> Replayer:
+        """Return this to be replayed whole, never re-based on what was measured."""
+        return replace(self, inputs=self.inputs._replace(memory=np.inf))
+
+    def play(self, physics: npt.NDArray[Any], start: Array | None = None) -> Prediction:
+        """Replay under a physics record of shape (1,), from the recorded start or another [m, m, rad]."""
+        rows, poses = len(self.inputs.t), len(self.inputs.pose_t)
+        out = np.empty((rows, ROW_COLUMNS)), np.empty((rows, 4)), np.empty((poses, 3)), np.empty((poses, 3))
+        chosen = self.start if start is None else start
+        cap = self.recording.setup.duty_cap
+        if cap is not None:
+            physics = physics.copy()
+            physics["duty_cap"] = cap
+        derived, state = np.zeros(1, DERIVED), np.zeros(1, STATE)
+        replay_rows(self.inputs, physics, derived, state, chosen, self.clock_offset_s, STEP_S, *out)
+        return Prediction(out[0][self.first_row :], out[1][self.first_row :], out[2], out[3])
+
+    def aligned_start(self, physics: npt.NDArray[Any], within_s: float = np.inf) -> Array:
+        """Return the start pose whose open-loop replay fits the poses best, shape (3,) [m, m, rad].
+
+        The start is a nuisance: one noisy camera frame would otherwise tilt the whole path.
+        """
+        if not self.has_poses:
+            return self.start
+        early = self.inputs.pose_t <= within_s
+        scale = np.array([0.01, 0.01, 0.05])
+
+        def misfit(shift: Array) -> Array:
+            errors = self.play(physics, self.start + shift * scale).pose_errors[early]
+            return np.tanh(np.nan_to_num(errors.ravel()) / 30.0)  # slides far off must not tilt the start
+
+        found = least_squares(misfit, np.zeros(3), max_nfev=20).x
+        return self.start + np.asarray(found) * scale
+
+
+def replayer_of(
+    recording: Recording,
+    sd: npt.ArrayLike = USUAL_NOISE,
+    walk: npt.ArrayLike = USUAL_WALK,
+    memory_s: float = np.inf,
+) -> Replayer:
+    """Make a recording ready to be replayed.
+
+    Parameters
+    ----------
+    recording
+        What to replay.
+    sd, walk
+        Noise, as in `KernelInput`.
+    memory_s
+        Over how long a replay is drawn back to the measurement [s]; inf: whole and open loop.
+    """
+    first = float(recording.t_s[0])
+    zero = 0.0 if 0.0 < first <= LATEST_FIRST_ROW_S else first
+    t, commands = recording.t_s - zero, recording.commands
+    pose = np.column_stack([recording.x_m, recording.y_m, recording.heading_rad])
+    posed = ~np.isnan(pose).all(axis=1)
+    pose_t, pose = t[posed], pose[posed]
+    r = recording
+    measured = np.column_stack([r.left_angle_rad, r.right_angle_rad, r.battery_v, r.yaw_rate_rad_s])
+    if zero < first:
+        t, commands = np.r_[0.0, t], np.vstack([commands[:1], commands])
+        measured = np.vstack([np.full((1, 4), np.nan), measured])
+    inputs = KernelInput(
+        t, commands, measured, pose_t, pose, np.array(sd, float), np.array(walk, float), memory_s,
+        r.setup.rig == "bench",
+    )  # fmt: skip
+    return Replayer(recording, inputs, pose, _first_pose(pose))
+
+
+def _first_pose(pose: Array) -> Array:
+    """Return each coordinate where it was first seen; 0 where it never was."""
+    start = np.zeros(3)
+    for k in range(3):
+        seen = np.flatnonzero(~np.isnan(pose[:, k]))
+        start[k] = pose[seen[0], k] if len(seen) else 0.0
+    return start
+
+
+def replay(
+    recording: Recording,
+    robot: Robot,
+    memory_s: float = np.inf,
+    align: bool = True,
+) -> Replay:
+    """Replay a recording's commands through a simulated robot.
+
+    Parameters
+    ----------
+    recording
+        Its commands are held from row to row; its rig says whether the wheels touch the floor.
+    robot
+        The robot, with whatever effects it has.
+    memory_s
+        Over how long the replay remembers its own drift before it is drawn back to the measurement [s]; inf: whole and
+        open loop.
+    align
+        Whether an open-loop replay's start pose is fitted to the poses seen; otherwise the first one is taken.
+
+    Returns
+    -------
+    Replay
+        Series at the recording's rows.
+    """
+    replayer = replayer_of(recording, memory_s=memory_s)
+    physics = robot.physics
+    start = replayer.aligned_start(physics) if align and np.isinf(memory_s) else None
+    rows = replayer.play(physics, start).rows
+    return Replay(recording.t_s, *(rows[:, k].copy() for k in range(ROW_COLUMNS)))

@@ -1,0 +1,45 @@
+"""The path a robot was measured to take: camera poses smoothed with the help of a replay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.replay.kernel import HEADING, X, Y
+from gecar.reality.replay.replayer import Replayer
+
+Array = npt.NDArray[np.float64]
+# Over this the difference between camera and replay is averaged: long against a frame, short against an error's growth.
+SMOOTH_S = 0.12
+
+
+def measured_path(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
+    """Return the axle centre's pose at every row, shape (rows, 3) [m, m, rad], on the brick's clock.
+
+    A following replay gives the shape between frames; what the camera says besides is smoothed forwards and backwards,
+    so that the path neither lags nor carries the camera's noise.
+    """
+    rows = replayer.play(physics).rows
+    path: Array = rows[:, [X, Y, HEADING]].copy()
+    late = float(physics["pose_delay"][0]) + replayer.clock_offset_s
+    t = replayer.inputs.pose_t - late
+    for k in range(3):
+        seen = ~np.isnan(replayer.inputs.pose[:, k])
+        replayed = np.interp(t[seen], replayer.t, path[:, k])
+        path[:, k] += _smoothed(t[seen], replayer.inputs.pose[seen, k] - replayed, replayer.t)
+    return path
+
+
+def _smoothed(t: Array, values: Array, at: Array) -> Array:
+    """Return local straight-line fits with normal weights, shape of ``at``."""
+    if len(t) < 2:
+        return np.full(len(at), values.mean() if len(values) else 0.0)
+    grid = np.arange(at[0], at[-1] + 0.02, 0.02)
+    reach = grid[:, None] - t[None, :]
+    w = np.exp(-0.5 * (reach / SMOOTH_S) ** 2) + 1e-12
+    s0, s1, s2 = w.sum(1), (w * reach).sum(1), (w * reach**2).sum(1)
+    v0, v1 = w @ values, (w * reach) @ values
+    line = (v0 * s2 - v1 * s1) / (s0 * s2 - s1 * s1 + 1e-30)
+    return np.interp(at, grid, line)

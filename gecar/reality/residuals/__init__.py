@@ -1,0 +1,1 @@
+"""Measured less simulated, whitened: of the motion, and of the colour sensor along the measured path."""

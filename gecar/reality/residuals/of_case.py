@@ -1,0 +1,164 @@
+"""Whitened residuals of several recordings together: what effects are fitted to.
+
+Readings of the colour sensor are compared along the measured path, so that what moves the robot and what the sensor
+sees are separated: effects of one kind do not change residuals of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.noise.sensor_noise import Noise
+from gecar.reality.recordings.recording import Recording
+from gecar.reality.replay.channels import ResidualIndex
+from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
+from gecar.reality.residuals.threads import Threads
+from gecar.world.course import Course, load_course
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Physics = npt.NDArray[Any]
+
+LARGEST = 1e3  # standard deviations at which residuals are cut
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals of motion, or of the colour sensor, of several recordings.
+
+    Attributes
+    ----------
+    recordings
+        Each beside its simulation.
+    sensor
+        Whether they are the colour sensor's.
+    threads
+        Replay the recordings.
+    """
+
+    recordings: tuple[RecordingResiduals, ...]
+    sensor: bool
+    threads: Threads = field(default_factory=Threads, compare=False)
+
+    def errors(self, physics: Physics) -> Array:
+        """Return the whitened residuals, shape (n,); samples that were not measured are left out."""
+        if not self.recordings:
+            return np.zeros(0)
+        parts = self.threads.map(
+            lambda r: r.sensor_errors(physics) if self.sensor else r.motion_errors(physics), self.recordings
+        )
+        everything = np.concatenate(parts)[self._located[1]]
+        return np.clip(np.nan_to_num(everything, nan=LARGEST), -LARGEST, LARGEST)
+
+    @cached_property
+    def _located(self) -> tuple[ResidualIndex, Mask]:
+        """Where each residual comes from, and which of all samples they are."""
+        parts = [
+            r.sensor_index(k) if self.sensor else r.motion_index(k) for k, r in enumerate(self.recordings)
+        ]
+        if not parts:
+            return ResidualIndex(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0)), np.zeros(0, bool)
+        there = np.concatenate([mask for _, mask in parts])
+        whole = ResidualIndex(
+            *(np.concatenate([getattr(i, f) for i, _ in parts]) for f in ("recording", "channel", "t_s"))
+        )
+        return whole.kept(there), there
+
+    @property
+    def index(self) -> ResidualIndex:
+        """Where each residual comes from."""
+        return self._located[0]
+
+    @property
+    def reading_sd(self) -> Array:
+        """Standard deviation of each reading, the path's uncertainty included, shape (n,) [%]; of sensor residuals."""
+        paths = [r.nuisances.path for r in self.recordings]
+        return np.concatenate([path.reading_sd for path in paths if path is not None])[self._located[1]]
+
+    @property
+    def clock_offsets_s(self) -> Array:
+        """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
+        return np.array([r.nuisances.clock_offset_s for r in self.recordings])
+
+    def with_clock_offsets(self, offsets_s: Array) -> Residuals:
+        """Return these with other camera clocks, shape (recordings,) [s]."""
+        changed = [
+            r.with_nuisances(replace(r.nuisances, clock_offset_s=float(offset)))
+            for r, offset in zip(self.recordings, offsets_s, strict=True)
+        ]
+        return replace(self, recordings=tuple(changed))
+
+    def with_mark(self, mark: Sequence[float] | Array) -> Residuals:
+        """Return these with the poses taken for those of a camera's mark on the robot; see `axle_pose`."""
+        ahead, left, turn = (float(part) for part in mark)
+        changed = [r.with_nuisances(replace(r.nuisances, mark=(ahead, left, turn))) for r in self.recordings]
+        return replace(self, recordings=tuple(changed))
+
+    def localised(self, physics: Physics) -> Residuals:
+        """Return these with start poses found from readings where no camera looked."""
+        return replace(
+            self, recordings=tuple(self.threads.map(lambda r: r.localised(physics), self.recordings))
+        )
+
+    def with_paths(self, physics: Physics, inflation: Array | None = None) -> Residuals:
+        """Return these with the paths along which readings are predicted, as a model of the motion gives them.
+
+        Parameters
+        ----------
+        physics
+            That model, shape (1,).
+        inflation
+            By how much slow noise of x, y and heading exceeds white noise (variances), shape (3,); default: 1.
+        """
+        slow = np.ones(3) if inflation is None else inflation
+        along = self.threads.map(lambda r: r.with_path(physics, slow), self.recordings)
+        return replace(self, recordings=tuple(along))
+
+    def of_sensor(self) -> Residuals:
+        """Return the colour sensor's residuals of the recordings that have any; they need paths."""
+        return replace(self, recordings=tuple(r for r in self.recordings if r.reads), sensor=True)
+
+
+def motion_residuals(
+    recordings: Sequence[Recording],
+    noise: Noise,
+    memory_s: float,
+    threads: Threads,
+    bench_memory_s: float | None = None,
+) -> Residuals:
+    """Return the residuals of motion of recordings, each on the course it names.
+
+    Parameters
+    ----------
+    recordings, noise
+        What was measured, and how noisy it is.
+    memory_s
+        Over how long replays are drawn back to the measurement [s].
+    threads
+        Replay the recordings.
+    bench_memory_s
+        The same for recordings made on a bench; default: the same.
+
+    Raises
+    ------
+    InputError
+        If a course file is missing or wrong.
+    """
+    courses: dict[str, Course | None] = {}
+    for recording in recordings:
+        name = recording.setup.course
+        if name not in courses:
+            needed = recording.setup.rig == "floor" and name != "none"
+            courses[name] = load_course(name) if needed else None
+    on_bench = memory_s if bench_memory_s is None else bench_memory_s
+    beside = tuple(
+        residuals_of(r, noise, on_bench if r.setup.rig == "bench" else memory_s, courses[r.setup.course])
+        for r in recordings
+    )
+    return Residuals(beside, sensor=False, threads=threads)

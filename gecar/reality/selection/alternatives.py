@@ -1,0 +1,29 @@
+"""What these recordings can not tell apart: effects that do as well in each other's place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.optimisation.least_squares import costs
+from gecar.reality.selection.acceptance import is_worthwhile
+from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.thresholds import CERTAIN, CLOSE
+
+
+def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
+    """Return the effects that could stand in an effect's place: models by effect."""
+    taken, estimator = explained.taken, explained.problem.estimator
+    out = {}
+    for other in explained.tried[step.stage]:
+        if other.effect in taken.effects or other.gain < (1.0 - 2.0 * CLOSE) * step.gain:
+            continue
+        rest = [e for e in taken.effects if e != step.effect]
+        swapped = estimator.fit((*rest, other.effect), {**taken.values, **other.model.values})
+        loss = costs(swapped.errors) - costs(taken.errors)
+        spans = np.bincount(estimator.blocks.spans, loss)
+        close = loss.sum() < CLOSE * step.gain
+        uncertain = loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2))
+        if close and uncertain and is_worthwhile(swapped, other.effect):
+            out[other.effect] = swapped
+    return out

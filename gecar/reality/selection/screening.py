@@ -1,0 +1,195 @@
+"""Screening: every effect of the catalogue scored on top of a model; the most promising are fitted in full."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.initial_values import initial_values
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.fitting.parameters import Parameters
+from gecar.reality.fitting.parameters import free as free_parameters
+from gecar.reality.optimisation.cma_es import cma_es
+from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares
+from gecar.reality.selection.acceptance import is_worthwhile, worthwhile
+from gecar.reality.selection.model_tolerance import tolerated
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.thresholds import (
+    COMPETING,
+    DOUBTFUL_FIT,
+    NEGLIGIBLE,
+    SEARCHED,
+)
+from gecar.world.effects import BY_ID, Search
+
+Array = npt.NDArray[np.float64]
+
+IMPROVED, REFITTED = 10, 5  # effects of a stage that are improved by two iterations, and fitted in full
+SHORT = 8  # generations of a first search
+FINALIST_SPREAD = 0.6  # of a parameter's search spread, for the second search
+DOUBTFUL_SPREAD = 1.5  # of a parameter's search spread, about a fit that leaves much
+USUAL = Search()
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """An effect on top of a model: the best starting values, where a first fit ended, and the gain it promises."""
+
+    effects: tuple[str, ...]
+    parameters: Parameters
+    minimum: Minimum
+    starts: tuple[Array, ...]
+    promise: float
+    base: Model
+
+    @property
+    def effect(self) -> str:
+        return self.effects[-1]
+
+    @property
+    def gain(self) -> float:
+        return self.base.cost - self.minimum.cost
+
+    @property
+    def values(self) -> dict[str, dict[str, float]]:
+        return self.parameters.values(self.minimum.z)
+
+    @property
+    def search(self) -> Search | None:
+        return BY_ID[self.effect].search
+
+
+def candidate_steps(problem: Problem, model: Model) -> list[Step]:
+    """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
+    estimator, small = problem.estimator, tolerated(problem, model)
+    others = [e for e in problem.catalogue if e not in model.effects]
+    bases = {e: estimator.tolerating(model, small[e]) for e in others}
+    trials = [t for t in (_scored(problem, bases[e], e) for e in others) if t]
+    trials.sort(key=lambda t: -t.promise)
+    if not trials or trials[0].promise < NEGLIGIBLE * problem.blocks:
+        return []
+    begun = [_improved(estimator, t) for t in trials[:IMPROVED]]
+    begun.sort(key=lambda t: t.minimum.cost)
+    # What is too small for a name may gain by imitating much; it must not shut the others out.
+    named = [t.gain for t in begun if worthwhile(t.parameters, t.minimum.z, t.effect)]
+    best = max(named, default=max(t.gain for t in begun))
+    steps = [
+        step_of(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
+        for t in begun[:REFITTED]
+        if t.gain >= NEGLIGIBLE * best
+    ]
+    steps.sort(key=lambda s: -s.gain)
+    if steps and steps[0].model.excess_energy > DOUBTFUL_FIT * problem.blocks:
+        steps[0] = step_of(
+            estimator, steps[0].effect, steps[0].base, _searched_about(estimator, steps[0].model)
+        )
+    return steps
+
+
+def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
+    """Score an effect without fitting it: by its sensitivities at the model, and by trying its starting values."""
+    estimator = problem.estimator
+    parameters = free_parameters(estimator.robot, (*model.effects, effect))
+    residual = estimator.residual(parameters, model.tolerated)
+
+    def vector(values: Mapping[str, float]) -> Array:
+        return parameters.vector({**model.values, effect: values})
+
+    values = initial_values(
+        effect, estimator.robot, problem.recordings, lambda tried: residual(vector(tried))
+    )
+    starts = [vector(each) for each in values]
+    if not starts:
+        return None
+    found = np.array([cost(residual(z)) for z in starts])
+    order = np.argsort(found)
+    search = BY_ID[effect].search or USUAL
+    kept = _apart([starts[k] for k in order], search.restarts, search.apart)
+    least = float(found[order[0]])
+    promise = max(estimator.linear_gain(model, effect), model.cost - least)
+    start = Minimum(kept[0], model.errors, least)
+    return _Trial((*model.effects, effect), parameters, start, kept, promise, model)
+
+
+def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
+    """Improve an effect's best start by two iterations."""
+    residual = estimator.residual(trial.parameters, trial.base.tolerated)
+    bounds, probes = trial.parameters.bounds, trial.parameters.probes
+    return replace(trial, minimum=least_squares(residual, trial.starts[0], bounds, probes, rounds=2))
+
+
+def _fitted(estimator: Estimator, trial: _Trial, best: float, model: Model) -> Model:
+    """Fit an effect in full; search without derivatives where they mislead and the effect is a rival."""
+    if trial.search and trial.gain > COMPETING * best and best > SEARCHED * model.cost:
+        return _searched(estimator, trial, trial.search)
+    return estimator.fit(trial.effects, trial.values, tolerated=trial.base.tolerated)
+
+
+def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:
+    """Fit an effect from several starts without derivatives, then with them."""
+    model, parameters = trial.base, trial.parameters
+    residual = estimator.residual(parameters, model.tolerated)
+    own = slice(len(model.z), None)
+    spread = np.array([c.parameter.search_spread for c in parameters.coordinates[own]])
+    low, high = parameters.bounds
+    bounds = (low[own], high[own])
+
+    def cost_of(tail: Array) -> float:
+        return cost(residual(np.r_[model.z, tail]))
+
+    starts = (*trial.starts, trial.minimum.z)
+    short = [cma_es(cost_of, z[own], spread, bounds, estimator.rng, SHORT) for z in starts]
+    short.sort(key=lambda pair: pair[1])
+    best, least = trial.minimum.z, trial.minimum.cost
+    for start, _ in short[: search.finalists]:
+        tail, found = cma_es(
+            cost_of,
+            start,
+            FINALIST_SPREAD * spread,
+            bounds,
+            estimator.rng,
+            search.generations,
+            search.trials_factor,
+        )
+        if found < least:
+            best, least = np.r_[model.z, tail], found
+    refined = estimator.fit(trial.effects, parameters.values(best), tolerated=model.tolerated)
+    return estimator.searched(refined)
+
+
+def _searched_about(estimator: Estimator, model: Model) -> Model:
+    """Search about a fit that leaves much, and fit on from there."""
+    again = estimator.searched(model, DOUBTFUL_SPREAD)
+    if again is model:
+        return model
+    found = estimator.fit(again.effects, again.values, tolerated=again.tolerated)
+    return found if found.cost < again.cost else again
+
+
+def step_of(estimator: Estimator, effect: str, base: Model, found: Model) -> Step:
+    """Return the step from a model to one with an effect more."""
+    inflation = estimator.blocks.inflation(found.errors)
+    before, after = (estimator.blocks.excess_energy(m.errors, inflation) for m in (base, found))
+    size = is_worthwhile(found, effect)
+    return Step(
+        effect,
+        base,
+        found,
+        base.cost - found.cost,
+        worthwhile=size,
+        energy_before=before,
+        energy_after=after,
+    )
+
+
+def _apart(starts: Sequence[Array], count: int, distance: float) -> tuple[Array, ...]:
+    """Return the first few starts that are no neighbours of each other."""
+    kept: list[Array] = []
+    for start in starts:
+        if len(kept) < count and all(np.max(np.abs(start - other)) > distance for other in kept):
+            kept.append(start)
+    return tuple(kept)

@@ -1,0 +1,129 @@
+"""Starts on a course worth a closer look: every one of a grid tried on a blurred floor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import zoom
+
+from gecar.compiled import compiled
+from gecar.world.course import Course
+from gecar.world.sensing import spot_average
+
+Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
+
+GRID_M, HEADINGS = 0.02, 180
+COARSE_SPOT_M = 0.04  # what a degree of heading and a cell of the grid smear over some decimetres
+FINE_M, FINE_RAD, FINE_STEPS = 0.005, math.radians(0.5), 8
+FINE_SPOT_M = 0.015
+SCANNED, RETURNED = 60, 12
+READING_SD = 25.0  # of a reading on the blurred floor [%]
+MOST_PER_SAMPLE = 4.0  # of cost
+NEAR_M, NEAR_RAD = 0.06, math.radians(8.0)  # what a fine scan covers
+SAME_M, SAME_RAD = 0.015, math.radians(2.0)  # a line has two edges, two centimetres apart
+
+
+def likely_starts(points: Array, read: Array, course: Course, physics: Physics) -> list[Array]:
+    """Return the starts that fit best on a blurred floor, best first: over the whole course, then finely around.
+
+    Parameters
+    ----------
+    points, read
+        Where the sensor was, read from the start's pose [m], shape (n, 2), and what it read there [%], shape (n,).
+    course
+        What was driven on; its own start is always looked at.
+    physics
+        Record of the robot, shape (1,).
+
+    Returns
+    -------
+    list of numpy.ndarray
+        Poses of the axle's centre [m, m, rad], shape (3,) each.
+    """
+    order = np.random.default_rng(0).permutation(len(read))  # bad starts are given up early
+    points, read, bare = points[order], read[order], float(physics["white"][0])
+    x, y = (np.arange(0.5 * GRID_M, size, GRID_M) for size in (course.width_m, course.height_m))
+    angles = np.linspace(0.0, math.tau, HEADINGS, endpoint=False)
+    floor = _blurred(course, physics, GRID_M, COARSE_SPOT_M)
+    best = np.empty((HEADINGS, 4))
+    _scan(floor, GRID_M, points, read, bare, x, y, angles, best)
+    home = np.array([course.start.x_m, course.start.y_m, course.start.heading_rad])
+    places = [home, *_distinct(best, NEAR_M, NEAR_RAD)[:SCANNED]]
+    floor = _blurred(course, physics, FINE_M, FINE_SPOT_M)
+    around = np.arange(-FINE_STEPS, FINE_STEPS + 1)
+    finer = []
+    for x0, y0, angle in places:
+        best = np.empty((len(around), 4))
+        own = x0 + FINE_M * around, y0 + FINE_M * around, angle + FINE_RAD * around
+        _scan(floor, FINE_M, points, read, bare, *own, best)
+        finer.append(best)
+    return _distinct(np.concatenate(finer), SAME_M, SAME_RAD)[:RETURNED]
+
+
+def _distinct(found: Array, near_m: float, near_rad: float) -> list[Array]:
+    """Return starts, best first, without those near a better one; rows are cost, x, y, heading."""
+    starts: list[Array] = []
+    for start in found[np.argsort(found[:, 0]), 1:]:
+        if not any(near(start, other, near_m, near_rad) for other in starts):
+            starts.append(start)
+    return starts
+
+
+def _blurred(course: Course, physics: Physics, pitch: float, spot: float) -> Array:
+    """Return what a wide spot reads over the floor [%], shape (rows, columns)."""
+    p = physics[0]
+    averaged = spot_average(course.raster(course.pitch_m), course.pitch_m, spot)
+    coarse = zoom(averaged, course.pitch_m / pitch, order=1, grid_mode=True, mode="nearest")
+    level: Array = p["black"] + (p["white"] - p["black"]) * coarse.astype(np.float64) / 255.0
+    return level
+
+
+@compiled
+def _scan(
+    floor: Array,
+    pitch: float,
+    points: Array,
+    read: Array,
+    bare: float,
+    x: Array,
+    y: Array,
+    angles: Array,
+    best: Array,
+) -> None:
+    """Try every start of a grid; write each heading's least cost and the start, shape (headings, 4)."""
+    rows, columns = floor.shape
+    least = np.inf
+    for h in range(angles.shape[0]):
+        cos = math.cos(angles[h]) / pitch
+        sin = math.sin(angles[h]) / pitch
+        best[h, 0] = np.inf
+        best[h, 3] = angles[h]
+        for i in range(y.shape[0]):
+            for j in range(x.shape[0]):
+                cost = 0.0
+                most = min(best[h, 0], 2.0 * least)
+                for k in range(points.shape[0]):
+                    column = math.floor(x[j] / pitch + points[k, 0] * cos - points[k, 1] * sin)
+                    row = math.floor(y[i] / pitch + points[k, 0] * sin + points[k, 1] * cos)
+                    level = bare
+                    if 0 <= column < columns and 0 <= row < rows:
+                        level = floor[row, column]
+                    z = (read[k] - level) / READING_SD
+                    cost += min(z * z, MOST_PER_SAMPLE)
+                    if cost >= most:
+                        break
+                if cost < best[h, 0]:
+                    best[h, 0] = cost
+                    best[h, 1] = x[j]
+                    best[h, 2] = y[i]
+        least = min(least, best[h, 0])
+
+
+def near(one: Array, other: Array, near_m: float, near_rad: float) -> bool:
+    """Return whether two poses are closer to each other than a distance and an angle."""
+    turn = math.remainder(one[2] - other[2], math.tau)
+    return float(np.hypot(*(one[:2] - other[:2]))) < near_m and abs(turn) < near_rad

@@ -1,0 +1,102 @@
+"""Intervals: what other recordings, other noise, and the simulation's own faults would have made of a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.gain_offset import gain_intervals
+from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.profile import RISE_95, reaches
+from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
+from gecar.reality.verdict import Interval
+
+Array = npt.NDArray[np.float64]
+
+NORMAL_95 = 1.96
+FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
+FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
+
+
+def deviations(estimator: Estimator, model: Model) -> Array:
+    """Return standard deviations of a model's coordinates, shape (k,)."""
+    return half_widths(estimator, model) / NORMAL_95
+
+
+def half_widths(estimator: Estimator, model: Model) -> Array:
+    """Return half the 95 % intervals of a model's coordinates, shape (k,).
+
+    The larger of two: a sandwich over half-second spans, which holds whatever the noise's correlation, and the
+    jackknife over recordings with Student's t, which also holds what no noise model knows.
+
+    Sources: White, Econometrica 48 (1980) 817; Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
+    """
+    slopes, errors = estimator.own_sensitivities(model), model.errors
+    w = weights(errors)
+    normal = slopes.T @ (w[:, None] * slopes)
+    inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
+    scores = np.stack([np.bincount(estimator.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
+    sandwich = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 0.0)
+    leaps = []
+    for k in np.unique(estimator.blocks.folds):
+        rows = estimator.blocks.folds == k
+        part = slopes[rows].T @ (w[rows, None] * slopes[rows])
+        leaps.append(
+            np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
+        )
+    folds = len(leaps)
+    if folds < 2:
+        return NORMAL_95 * np.sqrt(sandwich)
+    jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
+    return np.maximum(NORMAL_95 * np.sqrt(sandwich), student.ppf(0.975, folds - 1) * np.sqrt(jack))
+
+
+def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
+    """Whether the interval of an effect's size holds its neutral value.
+
+    Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
+    what they gain together decides.
+    """
+    sizes = [
+        (spans[effect][c.parameter.label], c.value(0.0))
+        for c in model.parameters.coordinates
+        if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
+    ]
+    return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
+
+
+def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
+    """Return 95 % intervals of every parameter of a model, by effect and label."""
+    if not model.effects:
+        return {}
+    out: dict[str, dict[str, Interval]] = {}
+    low, high = model.parameters.bounds
+    spans = gain_intervals(estimator, model)
+    for k, (left, right) in walked_quantiles(estimator, model, seed).items():
+        spans[k] = (max(float(model.z[k]) - left, 0.0), max(right - float(model.z[k]), 0.0))
+    everything, residual = np.arange(len(model.z)), estimator.residual(model.parameters, model.tolerated)
+    for k, (c, half) in enumerate(
+        zip(model.parameters.coordinates, half_widths(estimator, model), strict=True)
+    ):
+        z = float(model.z[k])
+        step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
+        # A parameter that acts by its ratio has its logarithm for a coordinate: a share of it is a difference there.
+        size = c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step
+        if k in spans:
+            down, up = spans[k]
+        elif half > NORMAL_95 * FLAT:
+            down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
+        else:
+            down = up = float(half)
+        reach = NORMAL_95 * 0.5 * size
+        edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
+        ends = sorted(c.value(float(end)) for end in edges)
+        out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(
+            c.value(z), ends[0], ends[1], c.parameter.unit
+        )
+    return out

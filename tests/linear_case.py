@@ -1,0 +1,77 @@
+"""A case whose residuals are linear in a few effects: stages of the selection can be tested without a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from gecar.reality.fitting.parameters import free
+from gecar.reality.recordings.recording import make_recording
+from gecar.reality.replay.channels import ResidualIndex
+from gecar.reality.selection.problem import Problem, problem_of
+from gecar.reality.selection.thresholds import MOTION
+from gecar.world.robot import load_robot
+
+EV3 = load_robot("ev3")
+ROW_S, SECONDS = 0.01, 6.0
+RUN = make_recording("made", {n: np.arange(3.0) for n in ("t_s", "left_duty_pct", "right_duty_pct")})
+
+
+@dataclass(frozen=True)
+class LinearResiduals:
+    """Residuals of one channel: noise, and responses to effects, one for each size worth a name."""
+
+    responses: Mapping[str, np.ndarray]
+    truth: Mapping[str, float]
+    noise: np.ndarray
+    count: int
+    sensor: bool = False
+
+    @property
+    def recordings(self) -> tuple[Any, ...]:
+        return tuple(SimpleNamespace(recording=RUN) for _ in range(self.count))
+
+    @property
+    def clock_offsets_s(self) -> np.ndarray:
+        return np.zeros(self.count)
+
+    def with_clock_offsets(self, offsets_s: np.ndarray) -> LinearResiduals:
+        return self  # no camera
+
+    @property
+    def index(self) -> ResidualIndex:
+        rows = len(self.noise) // self.count
+        recording = np.repeat(np.arange(self.count, dtype=np.int32), rows)
+        return ResidualIndex(
+            recording, np.zeros(len(self.noise), np.int32), np.tile(np.arange(rows) * ROW_S, self.count)
+        )
+
+    def errors(self, physics: np.ndarray) -> np.ndarray:
+        out = self.noise.copy()
+        for effect, response in self.responses.items():
+            c = free(EV3, [effect]).coordinates[0]
+            out += response * (self.truth.get(effect, 0.0) - c.at(float(physics[c.parameter.field][0])))
+        return out
+
+
+def bumps(seed: int, count: int, size: float) -> np.ndarray:
+    """Return a smooth response: random values every half second, filled straight."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, SECONDS, ROW_S)
+    knots = np.arange(0.0, SECONDS + 0.5, 0.5)
+    return np.concatenate([np.interp(t, knots, rng.normal(0.0, size, len(knots))) for _ in range(count)])
+
+
+def linear(
+    truth: Mapping[str, float], responses: Mapping[str, np.ndarray], seed: int = 0, count: int = 4
+) -> LinearResiduals:
+    rows = int(SECONDS / ROW_S) * count
+    return LinearResiduals(responses, truth, np.random.default_rng(seed).normal(0.0, 1.0, rows), count)
+
+
+def linear_problem(residuals: LinearResiduals) -> Problem:
+    return problem_of(residuals, EV3, tuple(residuals.responses), MOTION)  # type: ignore[arg-type]

@@ -1,0 +1,59 @@
+"""Intervals: as long as few recordings and flat valleys ask for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_case import bumps, linear, linear_problem
+from scipy.stats import t as student
+
+from gecar.reality.fitting.model import Model
+from gecar.reality.selection.problem import Problem
+from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, intervals
+from gecar.world.effects import BY_ID
+
+VISCOUS, INERTIA = "viscous_friction", "rotor_inertia"
+SIZE = BY_ID[VISCOUS].parameters[0].worthwhile
+
+
+def fitted(problem: Problem, *effects: str) -> Model:
+    return problem.estimator.fit(effects, {})
+
+
+def test_intervals_of_four_recordings_hold_the_truth_as_often_as_they_say() -> None:
+    held = []
+    for seed in range(200):
+        problem = linear_problem(linear({VISCOUS: 5.0}, {VISCOUS: bumps(1, 4, 0.2)}, seed))
+        model = fitted(problem, VISCOUS)
+        held.append(abs(model.z[0] - 5.0) < half_widths(problem.estimator, model)[0])
+    assert np.mean(held) > 0.92
+
+
+def test_where_recordings_disagree_few_of_them_widen_an_interval_by_student_s_t() -> None:
+    """One recording says 5, the other three 4: with three degrees of freedom, 3.18 standard errors, not 1.96."""
+    problem = linear_problem(linear({VISCOUS: 4.0}, {VISCOUS: np.tile(bumps(1, 1, 1.0), 4)}))
+    residuals = problem.residuals
+    noise = residuals.noise.copy()  # type: ignore[attr-defined]
+    noise[:600] += residuals.responses[VISCOUS][:600]  # type: ignore[attr-defined]
+    problem = linear_problem(type(residuals)(residuals.responses, residuals.truth, noise, 4))  # type: ignore[attr-defined]
+    model = fitted(problem, VISCOUS)
+    estimates = np.array([5.0, 4.0, 4.0, 4.0])
+    expected = student.ppf(0.975, 3) * np.std(estimates, ddof=1) / 2.0
+    assert half_widths(problem.estimator, model)[0] == pytest.approx(expected, rel=0.15)
+
+
+def test_a_profile_refits_the_others() -> None:
+    """Two effects that nearly do the same: each alone is known to nothing, whatever the other is held at."""
+    nearly = {VISCOUS: bumps(1, 4, 0.3), INERTIA: bumps(1, 4, 0.3) + 1e-3 * bumps(2, 4, 1.0)}
+    problem = linear_problem(linear({VISCOUS: 10.0}, nearly))
+    model = fitted(problem, VISCOUS, INERTIA)
+    found = intervals(problem.estimator, model)[VISCOUS]["coefficient_nms"]
+    assert found.low / SIZE < 6.0
+    assert found.high / SIZE > 14.0
+
+
+def test_an_interval_that_contains_neutral_is_told() -> None:
+    for size, contained in ((0.0, True), (6.0, False)):
+        problem = linear_problem(linear({VISCOUS: size}, {VISCOUS: bumps(1, 4, 1.0)}))
+        model = fitted(problem, VISCOUS)
+        assert contains_neutral(model, VISCOUS, intervals(problem.estimator, model)) is contained

@@ -1,0 +1,142 @@
+"""The stages of the selection, on residuals that are linear in a few effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_case import EV3, bumps, linear, linear_problem
+
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.selection import stepwise
+from gecar.reality.selection.alternatives import alternatives
+from gecar.reality.selection.cross_validation import judged, left_out_gains
+from gecar.reality.selection.null_distribution import largest_gains
+from gecar.reality.selection.screening import candidate_steps
+from gecar.reality.selection.stepwise import explain
+from gecar.reality.selection.thresholds import table
+
+VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
+RESPONSES = {VISCOUS: bumps(1, 4, 1.0), INERTIA: bumps(2, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
+
+
+def test_white_noise_has_no_excess_energy_and_a_slow_misfit_has_all_of_its_own() -> None:
+    blocks = Blocks(linear({}, RESPONSES).index)
+    rng = np.random.default_rng(0)
+    drawn = [blocks.excess_energy(rng.normal(size=2400)) for _ in range(200)]
+    assert abs(np.mean(drawn)) < 4.0 * np.std(drawn) / np.sqrt(200)
+    misfit = np.repeat(rng.normal(0.0, 3.0, 2400 // 300), 300)
+    assert blocks.excess_energy(misfit) == pytest.approx(np.sum(misfit**2) - blocks.count)
+
+
+def test_screening_ranks_the_cause_first() -> None:
+    problem = linear_problem(linear({INERTIA: 3.0}, RESPONSES))
+    steps = candidate_steps(problem, problem.known)
+    assert steps[0].effect == INERTIA
+    assert steps[0].model.z == pytest.approx([3.0], abs=0.2)
+
+
+def test_a_step_that_fits_noise_gains_nothing_on_recordings_left_out() -> None:
+    problem = linear_problem(linear({}, RESPONSES))
+    base = problem.known
+    model = problem.estimator.fit((VISCOUS,), {})
+    step = stepwise.Step(VISCOUS, base, model, base.cost - model.cost)
+    assert step.gain >= 0.0
+    assert left_out_gains(problem.estimator, step).sum() < 1.0
+    assert judged(problem, step).p > 0.05
+
+
+def test_the_null_distribution_is_the_largest_of_several_chi_squares() -> None:
+    problem = linear_problem(linear({}, RESPONSES))
+    gains = 2.0 * largest_gains(problem.estimator, problem.catalogue, problem.known)
+    assert np.mean(gains < 9.35) == pytest.approx(
+        0.95**0.5, abs=0.05
+    )  # three effects, chi-square 1 - (1 - p)^(1/3)
+
+
+def test_two_causes_are_both_taken_and_nothing_else() -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0, TRACK: 4.0}, RESPONSES)))
+    assert {step.effect for step in explained.steps} == {VISCOUS, TRACK}
+    assert not explained.unexplained
+
+
+def test_nothing_is_taken_from_noise() -> None:
+    explained = explain(linear_problem(linear({}, RESPONSES)))
+    assert explained.steps == ()
+    assert not explained.unexplained
+
+
+def test_what_no_effect_explains_is_unexplained() -> None:
+    unknown = linear({}, RESPONSES)
+    unknown = replace(unknown, noise=unknown.noise + bumps(9, 4, 5.0))
+    explained = explain(linear_problem(unknown))
+    assert explained.steps == ()
+    assert explained.unexplained
+
+
+def test_effects_with_the_same_response_are_alternatives() -> None:
+    twins = {VISCOUS: RESPONSES[VISCOUS], INERTIA: RESPONSES[VISCOUS] + 0.02 * RESPONSES[TRACK]}
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, twins)))
+    step = explained.steps[0]
+    assert {step.effect, *alternatives(explained, step)} == {VISCOUS, INERTIA}
+
+
+def test_alternatives_come_from_the_stage_an_effect_was_taken_at() -> None:
+    """After the first of two effects is dropped, the second one's rivals are still those of the second stage."""
+    twins = {
+        VISCOUS: bumps(1, 4, 1.0),
+        TRACK: bumps(3, 4, 1.0),
+        INERTIA: bumps(3, 4, 1.0) + 0.02 * bumps(7, 4, 1.0),
+    }
+    explained = explain(linear_problem(linear({VISCOUS: 6.0, TRACK: 3.0}, twins)))
+    second = explained.steps[1]
+    rest = explained.problem.estimator.fit((second.effect,), explained.taken.values)
+    dropped = replace(explained, steps=(second,), taken=rest)
+    assert second.stage == 1
+    assert {s.effect for s in dropped.tried[second.stage]} >= {TRACK, INERTIA} - {second.effect}
+    assert set(alternatives(dropped, second)) | {second.effect} == {TRACK, INERTIA}
+
+
+def test_an_effect_swapped_in_is_judged_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = linear_problem(linear({VISCOUS: 4.0, TRACK: 4.0}, RESPONSES))
+    estimator, seen = problem.estimator, list[str]()
+    wrong = estimator.fit((INERTIA, TRACK), {})
+    start = estimator.fit((TRACK,), {})
+    inertia = stepwise.Step(INERTIA, start, wrong, start.cost - wrong.cost, null_95=7.0, p=0.001)
+    track = stepwise.Step(TRACK, problem.known, start, problem.known.cost - start.cost, null_95=7.0, p=0.002)
+    right = estimator.fit((VISCOUS,), {})
+    viscous = stepwise.Step(VISCOUS, problem.known, right, problem.known.cost - right.cost)
+    monkeypatch.setattr(stepwise, "judged", lambda p, s: seen.append(s.effect) or judged(p, s))
+    taken, steps = stepwise._swapped_and_dropped(problem, [track, inertia], [[track, viscous], [inertia]])
+    assert set(taken.effects) == {TRACK, VISCOUS}
+    assert VISCOUS in seen
+    found = next(step for step in steps if step.effect == VISCOUS)
+    assert found.p != 0.001
+    assert found.gain == pytest.approx(found.base.cost - found.model.cost)
+
+
+def test_an_effect_that_gains_nothing_on_recordings_set_aside_is_a_candidate() -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0, TRACK: 4.0}, RESPONSES)))
+    opposite = linear({VISCOUS: -3.0, TRACK: 4.0}, RESPONSES, seed=5)
+    proof = confirmed(explained, opposite)  # type: ignore[arg-type]
+    assert [step.effect for step in proof.explained.steps] == [TRACK]
+    assert [step.effect for step in proof.candidates] == [VISCOUS]
+    assert proof.explained.taken.effects == (TRACK,)
+    assert proof.explained.unexplained
+    assert proof.explained.steps[0].holdout_gain > 0.0
+
+
+def test_taking_an_effect_out_restores_the_known_robot_s_value() -> None:
+    """A robot known to have viscous friction keeps it where the fit of another amount is taken out."""
+    problem = linear_problem(linear({VISCOUS: 3.0}, RESPONSES))
+    explained = explain(problem)
+    proof = confirmed(explained, linear({VISCOUS: 0.0}, RESPONSES, seed=5))  # type: ignore[arg-type]
+    assert proof.explained.taken.physics == EV3.physics
+
+
+def test_every_threshold_says_what_it_means_and_where_it_comes_from() -> None:
+    rows = table()
+    assert 20 < len(rows) < 30
+    assert all(value.meaning and value.source for _, value in rows)
