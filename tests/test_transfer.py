@@ -202,7 +202,8 @@ def test_variations_are_drawn_once_for_all():
         ("motor(80,80,100)", 5.0, "off_course"),
         ("motor(-80,-80,100)", 5.0, "missed_checkpoint"),
         ("motor(30,-30,100)", 0.3, "out_of_time"),
-        ("if(SensorValue > 200) { motor(1,1,1) }", 5.0, "stuck"),
+        ("if(SensorValue > 200) { motor(1,1,1) }", 0.3, "out_of_time"),
+        ("motor(80,80,0)", 5.0, "off_course"),
     ],
 )
 def test_drives_end_by_the_course_s_rules(robot, text, limit_s, outcome):

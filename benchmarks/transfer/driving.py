@@ -31,7 +31,6 @@ _COMPARE: tuple[Callable[[float, float], bool], ...] = (
     operator.eq,
     operator.ne,
 )
-_MOST_ROWS = 10_000  # at one moment: such a program never drives
 
 
 class Robot(Protocol):
@@ -102,13 +101,13 @@ class Interpreter:
         Returns
         -------
         tuple[int, int] | None
-            None if the program takes no time.
+            None if there is no statement. Where two passes take no time, the program goes on a millisecond later.
         """
-        for _ in range(_MOST_ROWS if self._rows else 0):
+        for _ in range(2 * len(self._rows)):
             if tick < self._until and not (self._ends and _holds(self._ends, read())):
                 return self._duties
             self._run_row(tick, read)
-        return None
+        return self._duties if self._rows else None
 
     def _run_row(self, tick: int, read: Callable[[], int]) -> None:
         row = self._rows[self._at % len(self._rows)]
