@@ -45,7 +45,7 @@ def test_an_edge_follower_laps_the_papers_course():
         ("motor(80,80,100)", Outcome.OFF_COURSE),
         ("motor(0,0,100)", Outcome.OUT_OF_TIME),
         ("motor(0,0,0)", Outcome.STUCK),
-        ("if(SensorValue > 50):\n    motor(80,80,0)\nelse:\n    motor(0,0,100)\n", Outcome.STUCK),
+        ("if(SensorValue > 50):\n    motor(80,80,0)\nelse:\n    motor(0,0,100)\n", Outcome.OFF_COURSE),
         ("motor(-50,-50,100)", Outcome.MISSED_CHECKPOINT),
     ],
 )

@@ -16,7 +16,7 @@ from gecar.files import read_toml
 from gecar.world.course import Course, list_courses, load_course
 from gecar.world.robot import Robot, load_robot
 
-TABLE = Path(__file__).parent / "reference_times.toml"
+TABLE = Path(__file__).parent / "reference_times" / "ev3.toml"
 
 
 @cache
