@@ -29,7 +29,7 @@ from gecar.plots.course import draw_course
 from gecar.plots.style import BLUE, GREEN, headline, look, new_figure, save
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.world.course import Course, list_courses, load_course
-from gecar.world.driving import _arrive, _tile_at, advance
+from gecar.world.driving import advance, arrive, tile_at
 from gecar.world.interpreter import Floor
 from gecar.world.reference import TABLE, reference_table
 from gecar.world.robot import Robot, load_robot
@@ -90,16 +90,16 @@ def pursue(
     passed, target, outcome = 0, 0, 0
     last_x, last_y = start[0], start[1]
     x, y = start[0], start[1]
-    tile = _tile_at(x, y, floor)
+    tile = tile_at(x, y, floor)
     left = right = 0.0
     steps = duties.shape[0] * every
     n = 0
     while n < steps:
         x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
-        now = _tile_at(x, y, floor)
+        now = tile_at(x, y, floor)
         if now != tile:
             tile = now
-            outcome, passed = _arrive(now, passed, n * c.dt, floor, arrival)
+            outcome, passed = arrive(now, passed, n * c.dt, floor, arrival)
             if outcome != 0:
                 break
         if n % every == 0:

@@ -18,9 +18,10 @@ from synthetic import drive
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.recordings.importing.clock import compare, estimate_offset
 from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
-from gecar.reality.recordings.importing.track import Track, odometry
+from gecar.reality.recordings.importing.track import Track
 from gecar.reality.recordings.recording import read_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
@@ -47,7 +48,8 @@ def test_clock_offset_is_found_within_two_milliseconds(seed, headings):
         -1000 * recording.y_m[seen][40:],
         -recording.heading_rad[seen][40:] if headings else None,
     )
-    brick = odometry(recording.t_s, recording.left_angle_rad, recording.right_angle_rad, 0.028, 0.12)
+    path = wheel_odometry(recording.left_angle_rad, recording.right_angle_rad, 0.028, 0.12)
+    brick = Track(recording.t_s, *path.T)
     found = estimate_offset(brick, camera)
     assert found.offset_s == pytest.approx(61.2345, abs=0.002)
     assert found.deviation_s < 0.004

@@ -141,8 +141,14 @@ def test_two_interpreters_do_the_same(text):
         assert ours.turn(tick, lambda reading=reading: reading) == others(tick / 1000.0, reading)
 
 
-def test_program_that_takes_no_time_gives_no_command():
-    assert Interpreter(rows("if(SensorValue > 50) { motor(1,1,0) }")).turn(0, lambda: 80) is None
+def test_program_that_takes_no_time_polls_and_an_empty_one_gives_no_command():
+    polls = Interpreter(rows("if(SensorValue > 50) { motor(1,1,0) }"))
+    assert [polls.turn(tick, lambda seen=seen: seen) for tick, seen in enumerate((20, 80, 20))] == [
+        (0, 0),
+        (1, 1),
+        (1, 1),
+    ]
+    assert Interpreter([]).turn(0, lambda: 80) is None
 
 
 def test_nominal_robot_drives_as_mechanics_says(robot):
