@@ -23,7 +23,7 @@ from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.search.settings import PRESETS
-from gecar.world.course import list_courses
+from gecar.world.course.course import list_courses
 
 PAPERS_BEST_S = 16.74  # Table 5
 REFERENCE = "better"

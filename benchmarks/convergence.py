@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.language.program import parse_program
-from gecar.world.course import Pose, load_course
+from gecar.world.course.course import Pose, load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import STEP_S, Outcome, World, simulate_many
 

@@ -7,9 +7,9 @@ import time
 
 import distributed  # noqa: F401  without it there is nothing to measure
 
+from gecar.parallel.executors import open_executor
 from gecar.results.config import configure
-from gecar.results.performing import perform
-from gecar.search.executors import open_executor
+from gecar.results.study_runs import perform
 
 CELLS, SEEDS = 9, 30
 CORES = (1, 2, 64, 1_000)

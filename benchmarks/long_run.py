@@ -8,10 +8,10 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
+from gecar.evolution.history import Generation
 from gecar.report.table import piped
 from gecar.results.config import configure
-from gecar.results.running import finish, start
-from gecar.search.history import Generation
+from gecar.results.run import finish, start
 
 SAMPLES = 10
 STATUS = Path("/proc/self/status")

@@ -25,16 +25,16 @@ import numpy.typing as npt
 from gecar.compiled import compiled
 from gecar.files import write_whole
 from gecar.language.program import parse_program
-from gecar.plots.course import draw_course
+from gecar.plots.courses.course import draw_course
 from gecar.plots.style import BLUE, GREEN, headline, look, new_figure, save
 from gecar.reality.optimisation.cma_es import cma_es
-from gecar.world.course import Course, list_courses, load_course
-from gecar.world.driving import advance, arrive, tile_at
-from gecar.world.interpreter import Floor
-from gecar.world.reference import TABLE, reference_table
+from gecar.world.course.course import Course, list_courses, load_course
+from gecar.world.course.reference_times import TABLE, reference_table
+from gecar.world.kernel.drive import advance, arrive, tile_at
+from gecar.world.kernel.interpreter import Floor
+from gecar.world.kernel.state import place
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Drive, Driver, Outcome, World, simulate
-from gecar.world.state import place
 
 ROBOT = "ev3"
 EVERY = 5  # steps a command is held: 10 ms

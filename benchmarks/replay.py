@@ -9,7 +9,7 @@ import numpy as np
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.replayer import replayer_of
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

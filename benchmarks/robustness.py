@@ -23,10 +23,10 @@ from gecar.language.program import parse_program
 from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell, Record
 from gecar.results.config import configure
-from gecar.results.running import load_task
+from gecar.results.run import load_task
 from gecar.search.chance import arrivals, times_at_steps
-from gecar.world.conditions import conditions
-from gecar.world.course import list_courses
+from gecar.world.course.course import list_courses
+from gecar.world.kernel.conditions import conditions
 from gecar.world.rollout import Fleet, Outcome, World
 
 OTHERS, OTHERS_SEED = 200, 900_000_011

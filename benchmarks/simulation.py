@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gecar.language.program import parse_program
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Driver, World
 

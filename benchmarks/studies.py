@@ -10,12 +10,12 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
+from gecar.parallel.executors import usable_cores
+from gecar.parallel.run_parallel import Workplace
 from gecar.results.cells import Cell, cells_of
 from gecar.results.config import configure
-from gecar.results.performing import perform_all
 from gecar.results.study import Planned, StudyFolder
-from gecar.search.executors import usable_cores
-from gecar.search.workplace import Workplace
+from gecar.results.study_runs import perform_all
 
 
 def add_seeds(parser: ArgumentParser, seeds: int, first: int = 1) -> None:

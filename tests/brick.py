@@ -26,7 +26,7 @@ class SimulatedBrick:
     Parameters
     ----------
     robot
-        A `gecar.world.stepped.SteppedRobot`; None for a brick on the table.
+        A `gecar.world.stepped_robot.SteppedRobot`; None for a brick on the table.
     course
         Where the robot drives.
     white, black

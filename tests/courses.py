@@ -1,6 +1,6 @@
 """Small courses for tests."""
 
-from gecar.world.course import Course, parse_course
+from gecar.world.course.course import Course, parse_course
 
 RING = "F-7\n|#|\nL-J"
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.compiled import compiled
-from gecar.world.dynamics import drift, step
+from gecar.world.kernel.dynamics import drift, step
+from gecar.world.kernel.state import DERIVED, STATE, derive, place
 from gecar.world.robot import Robot, load_robot
-from gecar.world.state import DERIVED, STATE, derive, place
 
 NOMINAL = load_robot("ev3")
 

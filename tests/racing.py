@@ -9,13 +9,13 @@ import numpy as np
 from benchmarks.reference_times import UNREACHED, Search
 from gecar.compiled import compiled
 from gecar.reality.optimisation.cma_es import cma_es
-from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
-from gecar.world.course import Course
-from gecar.world.driving import advance
-from gecar.world.lower_bound import sprint, travelled
+from gecar.world.course.course import Course
+from gecar.world.course.lower_bound.fastest_time import sprint, travelled
+from gecar.world.kernel.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.kernel.drive import advance
+from gecar.world.kernel.sensing import RING
+from gecar.world.kernel.state import DERIVED, STATE, derive, place
 from gecar.world.robot import Robot
-from gecar.world.sensing import RING
-from gecar.world.state import DERIVED, STATE, derive, place
 
 
 @compiled

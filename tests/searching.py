@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.state import Candidate
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.search.evaluation import Opcodes
-from gecar.search.evolution import Evolution
 from gecar.search.fitness import UNSOLVED, Scores, score_type
 from gecar.search.settings import Settings
-from gecar.search.state import Candidate
 
 MAPPER = Mapper(load_grammar("paper"))
 SMALL = Settings(population=20, generations=6, codons=60)

@@ -16,9 +16,9 @@ from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import read_recording
 from gecar.results.config import configure
+from gecar.results.fitness_table import read_table
 from gecar.results.folder import read_history
-from gecar.results.guard import read_table
-from gecar.world.course import COURSES, load_course
+from gecar.world.course.course import COURSES, load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate
 

@@ -7,7 +7,7 @@ import pytest
 from trials import SENSOR_FREE, trial, weak_robot
 
 from gecar.errors import InputError
-from gecar.plots.calibration import calibration_figure
+from gecar.plots.reality.calibration import calibration_figure
 from gecar.plots.style import is_whole
 from gecar.reality.calibrate.calibration import BLIND, calibrate
 from gecar.reality.calibrate.constants import CONSTANTS, chosen, with_constants

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from gecar.errors import InputError
+from gecar.evolution.ask_tell import Evolution, run
+from gecar.evolution.phenotypes import Phenotype
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.language.program import parse_program
-from gecar.results.running import arrives
+from gecar.results.run import arrives
 from gecar.search.batches import Batches
 from gecar.search.chance import (
     MARGIN,
@@ -23,11 +25,9 @@ from gecar.search.chance import (
     wants_more,
 )
 from gecar.search.evaluation import DriveEvaluator
-from gecar.search.evolution import Evolution, run
 from gecar.search.fitness import UNSOLVED, score_type
-from gecar.search.phenotypes import Phenotype
 from gecar.search.settings import Settings
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate

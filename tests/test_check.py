@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from gecar.results.guard import FitnessTable, moves, read_table, write_table
+from gecar.results.fitness_table import FitnessTable, moves, read_table, write_table
 
 SHIPPED = Path(__file__).parents[1] / "benchmarks/fitness_table.toml"
 NEW = """\

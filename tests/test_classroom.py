@@ -12,8 +12,8 @@ from trials import ARRIVES
 
 from gecar.errors import InputError
 from gecar.language.program import parse_program
-from gecar.plots.classroom import drive_json, write_classroom_page
-from gecar.world.course import load_course
+from gecar.plots.drives.classroom import drive_json, write_classroom_page
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

@@ -6,7 +6,7 @@ import sys
 import pytest
 from command import ROOT, start
 
-from gecar.cli.application import SEATS
+from gecar.cli.application import COMMANDS
 
 
 def test_help_names_every_command_and_imports_nothing_heavy():
@@ -21,22 +21,22 @@ def test_help_names_every_command_and_imports_nothing_heavy():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     ).stdout
     assert said.splitlines()[-1] == "[]"
-    assert all(seat.name in said for seat in SEATS if seat.exists)
+    assert all(entry.name in said for entry in COMMANDS if entry.exists)
 
 
-@pytest.mark.parametrize("seat", [seat for seat in SEATS if seat.exists], ids=lambda seat: seat.name)
-def test_every_command_explains_itself(gecar, seat):
-    ended = gecar(seat.name, "--help")
+@pytest.mark.parametrize("entry", [entry for entry in COMMANDS if entry.exists], ids=lambda entry: entry.name)
+def test_every_command_explains_itself(gecar, entry):
+    ended = gecar(entry.name, "--help")
     assert ended.code == 0
     assert "Usage" in ended.out
     assert len(ended.out.splitlines()) > 5
 
 
-@pytest.mark.parametrize("seat", [seat for seat in SEATS if seat.exists], ids=lambda seat: seat.name)
-def test_help_of_each_command_needs_no_compiler(seat):
+@pytest.mark.parametrize("entry", [entry for entry in COMMANDS if entry.exists], ids=lambda entry: entry.name)
+def test_help_of_each_command_needs_no_compiler(entry):
     code = (
-        "import sys; from gecar.cli.application import SEATS\n"
-        f"next(s for s in SEATS if s.name == {seat.name!r}).load()\n"
+        "import sys; from gecar.cli.application import COMMANDS\n"
+        f"next(s for s in COMMANDS if s.name == {entry.name!r}).load()\n"
         "assert not {'numba', 'matplotlib', 'scipy'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

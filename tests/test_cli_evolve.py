@@ -13,8 +13,8 @@ from command import call, start
 from PIL import Image
 
 from gecar.cli.progress import line
+from gecar.evolution.history import Generation
 from gecar.results.folder import read_history
-from gecar.search.history import Generation
 
 TINY = ("--population", 20, "--generations", 2, "--workers", 1)
 FILES = {

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from gecar.language.program import parse_program
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

@@ -22,15 +22,15 @@ from searching import MAPPER, SMALL, Toy, fingerprint, toy_scores
 
 from benchmarks.concealed.runner import run_all
 from gecar.errors import InputError
+from gecar.evolution.ask_tell import Evolution, run
+from gecar.parallel import dask_executor as cluster_module
+from gecar.parallel.dask_executor import run_as_here
+from gecar.parallel.executors import open_executor, side_by_side
 from gecar.results.folder import read_history, read_result
-from gecar.search import cluster as cluster_module
 from gecar.search.batches import Batches
-from gecar.search.cluster import run_as_here
 from gecar.search.evaluation import DriveEvaluator, Opcodes
-from gecar.search.evolution import Evolution, run
-from gecar.search.executors import open_executor, side_by_side
 from gecar.search.fitness import Scores
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World
 

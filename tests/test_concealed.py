@@ -30,9 +30,9 @@ from benchmarks.concealed.runner import run_all
 from benchmarks.concealed.score import figures, score
 from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth, replayed
+from gecar.parallel import run_parallel
+from gecar.parallel.executors import SerialExecutor
 from gecar.reality import discovery
-from gecar.search import workplace
-from gecar.search.executors import SerialExecutor
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted((ROOT / "benchmarks" / "concealed").glob("*.py"))
@@ -56,7 +56,7 @@ def examination(tmp_path_factory):
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
 def test_truth_world_imports_nothing_from_gecar(source):
     allowed = (
-        {"gecar.search.workplace"} if source.stem == "runner" else set()
+        {"gecar.parallel.run_parallel"} if source.stem == "runner" else set()
     )  # where tools run, and no physics
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         names = {alias.name for alias in node.names} if isinstance(node, ast.Import) else set()
@@ -227,7 +227,7 @@ def test_a_case_whose_workers_died_is_left_for_the_next_time(examination, tmp_pa
             died.set_exception(BrokenExecutor())
             return died
 
-    monkeypatch.setattr(workplace, "open_executor", lambda *place: Deadly())
+    monkeypatch.setattr(run_parallel, "open_executor", lambda *place: Deadly())
     tool = f"{{python}} {ROOT / 'tests' / 'silent_tool.py'} {{case}} {{out}}"
     assert run_all(examination / "cases", tmp_path, tool, 1, 60.0) == ["a"]
     assert "a: its workers died; the same command tries it again" in capsys.readouterr().err

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from courses import make_course
-from gecar.world.course import COURSES, list_courses, load_course
+from gecar.world.course.course import COURSES, list_courses, load_course
 from gecar.world.robot import load_robot
 
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from courses import course_text, make_course
 from gecar.errors import InputError
-from gecar.world.course import load_course, parse_course
-from gecar.world.course_new import new_course
-from gecar.world.tiles import TILES
+from gecar.world.course.course import load_course, parse_course
+from gecar.world.course.new_course import new_course
+from gecar.world.course.tiles import TILES
 
 BOX = "[[obstacles]]\nkind = 'box'\nat_m = [0.45, 0.45]\nsize_m = [0.1, 0.1]\n"
 
@@ -150,7 +150,7 @@ values = st.one_of(
     st.dictionaries(st.sampled_from(["map", "goal", "start", "walls", "obstacles", "image", "notes"]), values)
 )
 def test_random_tables_are_refused_or_valid(fields):
-    from gecar.world.course_file import validate
+    from gecar.world.course.schema import validate
 
     good = {"map": "--", "goal": [1, 0], "start": {"tile": [0, 0], "heading": "right"}}
     with contextlib.suppress(InputError):

@@ -3,8 +3,8 @@ import pytest
 
 from courses import make_course
 from gecar.errors import InputError
-from gecar.world.order import first_side
-from gecar.world.tiles import Side
+from gecar.world.course.driving_order import first_side
+from gecar.world.course.tiles import Side
 
 CROSSED = "F-7###\n|#|###\nL-+-7#\n##|#|#\n##L-J#"
 

@@ -6,9 +6,9 @@ from PIL import Image
 
 from courses import make_course
 from gecar.errors import InputError
-from gecar.plots.course_print import print_course
-from gecar.plots.sheets import FOOT_MM, MARGIN_MM, STRIP_MM, plan_sheets
-from gecar.world.course import load_course, parse_course
+from gecar.plots.courses.course_print import print_course
+from gecar.plots.courses.sheets import FOOT_MM, MARGIN_MM, STRIP_MM, plan_sheets
+from gecar.world.course.course import load_course, parse_course
 
 MM = 72.0 / 25.4
 NUMBER = rb"(-?[\d.]+)"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import UnivariateSpline
 
-from gecar.world.course import load_course, parse_course
+from gecar.world.course.course import load_course, parse_course
 from gecar.world.robot import load_robot
 
 ROWS = np.genfromtxt(Path(__file__).parent / "practice_line.csv", delimiter=",", names=True)

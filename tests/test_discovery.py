@@ -20,7 +20,7 @@ from command import start
 
 from gecar import reality
 from gecar.errors import InputError
-from gecar.plots.discovery import verdict_figures
+from gecar.plots.reality.verdict import verdict_figures
 from gecar.plots.style import picture
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.initial_values import initial_values

@@ -6,8 +6,8 @@ from driving import NOMINAL, axle, hold, run, wild_duties
 from nominal_reference import nominal_run
 
 from gecar.world.effects import CATALOGUE
-from gecar.world.motor import bare_shaft, conduct
-from gecar.world.state import DERIVED, GRAVITY, derive
+from gecar.world.kernel.motor import bare_shaft, conduct
+from gecar.world.kernel.state import DERIVED, GRAVITY, derive
 
 MOTOR, BODY = NOMINAL.motor, NOMINAL.body
 VOLTAGE = NOMINAL.battery.voltage

@@ -13,10 +13,10 @@ from gecar.errors import InputError
 from gecar.language.program import parse_program
 from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
 from gecar.reality.recordings.setup import Setup
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate
-from gecar.world.stepped import SteppedRobot
+from gecar.world.stepped_robot import SteppedRobot
 
 needs_brick = pytest.mark.skipif(brick.MISSING is not None, reason=str(brick.MISSING))
 LAP = "if SensorValue > 80:\n    motor(50, 50, 40)\nelse:\n    motor(-40, -100, 60)\n"

@@ -15,7 +15,7 @@ from test_results import SHORT, outputs
 
 from gecar.errors import InputError
 from gecar.results.config import configure
-from gecar.results.running import finish, resume, start
+from gecar.results.run import finish, resume, start
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ from PIL import Image
 from trials import ARRIVES, trial, weak_robot, write_trials
 
 from gecar.language.program import parse_program
-from gecar.plots.gap import gap_figure
+from gecar.plots.reality.gap import gap_figure
 from gecar.plots.style import is_whole
 from gecar.reality.compare.gap import Path, arrival_of, gap, nrmse, recorded_path
 from gecar.report.gap import gap_csv, gap_markdown, mean_and_spread, spread
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

@@ -77,9 +77,9 @@ def test_reads_of_the_readme_lead_somewhere():
 
 
 def test_commands_in_the_documents_exist():
-    from gecar.cli.application import SEATS
+    from gecar.cli.application import COMMANDS
 
-    known = {seat.name for seat in SEATS if seat.exists}
+    known = {entry.name for entry in COMMANDS if entry.exists}
     targets = set(re.findall(r"(?m)^([a-z]+):", (ROOT / "Makefile").read_text()))
     for text in (
         (ROOT / "README.md").read_text(),

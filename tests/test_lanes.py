@@ -6,10 +6,10 @@ import pytest
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.language.program import parse_program
-from gecar.world.conditions import joined, select
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE
-from gecar.world.lanes import LANES
+from gecar.world.kernel.conditions import joined, select
+from gecar.world.kernel.lanes import LANES
 from gecar.world.perturbation import drawn_conditions, under_drawn_conditions
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Driver, Fleet, Outcome, World

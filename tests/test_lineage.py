@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from searching import MAPPER, SMALL, generations
 
-from gecar.search import lineage as lineage_module
-from gecar.search.evolution import Evolution
-from gecar.search.lineage import CREEP, CROSSOVER, MUTATION, Lineage
+from gecar.evolution import lineage as lineage_module
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, Lineage
 
 VARIED = SMALL.model_copy(
     update={"crossover": "subtree", "mutation": "used_codon", "creep_rate": 0.2, "duplicates": "run"}

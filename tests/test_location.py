@@ -15,7 +15,7 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.verdict import Verdict
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import Robot
 
 

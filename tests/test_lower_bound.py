@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from racing import beyond_the_bound, farthest, fastest_found
 
 from courses import make_course
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
+from gecar.world.course.lower_bound.fastest_time import sprint, travelled
 from gecar.world.effects import CATALOGUE
-from gecar.world.lower_bound import sprint, travelled
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome, World, simulate
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gecar.world.course import list_courses, load_course, parse_course
-from gecar.world.mirror import mirrored
+from gecar.world.course.course import list_courses, load_course, mirrored, parse_course
 
 
 @pytest.mark.parametrize("name", list_courses())

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from gecar.world.bench import bench_step
+from gecar.world.kernel.motor import bench_step
+from gecar.world.kernel.state import DERIVED, REGULATOR_RATE, STATE, derive, place
+from gecar.world.motor_bench import altered, settled_speeds
 from gecar.world.robot import load_robot
-from gecar.world.shaft_speed import altered, settled_speeds
-from gecar.world.state import DERIVED, REGULATOR_RATE, STATE, derive, place
 
 EV3 = load_robot("ev3")
 

@@ -10,7 +10,7 @@ from benchmarks.paper_robot.twin import LONG_SIDE
 from gecar.errors import InputError
 from gecar.language.program import parse_program
 from gecar.reality.compare.gap import gap
-from gecar.world.course import Pose, load_course
+from gecar.world.course.course import Pose, load_course
 from gecar.world.robot import list_robots, load_robot
 from gecar.world.rollout import Outcome, World, simulate
 

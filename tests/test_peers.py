@@ -11,7 +11,7 @@ from benchmarks.peers.mappers import LIBRARIES, agree, genomes
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import parse_program
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

@@ -6,7 +6,7 @@ from PIL import Image, ImageFilter
 
 from courses import course_text
 from gecar.errors import InputError
-from gecar.world.course import load_course, parse_course
+from gecar.world.course.course import load_course, parse_course
 
 # What a camera at a slant makes of a field's corners [pixels], counter-clockwise from the lower left.
 SEEN = [(110.0, 880.0), (1490.0, 930.0), (1230.0, 170.0), (330.0, 130.0)]

@@ -6,12 +6,12 @@ from PIL import Image
 from gecar.errors import InputError
 from gecar.language.program import parse_program
 from gecar.plots import style
-from gecar.plots.animation import FRAMES_PER_S, film
-from gecar.plots.compare_runs import compare_runs
-from gecar.plots.convergence import Reference, convergence
-from gecar.plots.path import by_line, every_distance, line_colours, speed_of
-from gecar.plots.trajectory import trajectory
-from gecar.world.course import load_course
+from gecar.plots.drives.animation import FRAMES_PER_S, film
+from gecar.plots.drives.path import by_line, every_distance, line_colours, speed_of
+from gecar.plots.drives.trajectory import trajectory
+from gecar.plots.runs.compare_runs import compare_runs
+from gecar.plots.runs.convergence import Reference, convergence
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

@@ -3,9 +3,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from courses import make_course
-from gecar.plots.course import course_figure, describe, draw_course
+from gecar.plots.courses.course import course_figure, describe, draw_course
 from gecar.plots.style import save
-from gecar.world.course import list_courses, load_course, parse_course
+from gecar.world.course.course import list_courses, load_course, parse_course
 from gecar.world.robot import load_robot
 
 

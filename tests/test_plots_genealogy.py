@@ -9,12 +9,12 @@ from PIL import Image
 from searching import MAPPER, SMALL, generations
 
 from gecar.errors import InputError
-from gecar.plots.genealogy import fitness_words, genealogy, steps_of
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.lineage import Lineage
+from gecar.plots.runs.genealogy import fitness_words, genealogy, steps_of
 from gecar.plots.style import is_whole
 from gecar.results.ancestry import read_ancestry
 from gecar.results.folder import read_result
-from gecar.search.evolution import Evolution
-from gecar.search.lineage import Lineage
 
 VARIED = SMALL.model_copy(update={"crossover": "subtree", "mutation": "used_codon", "creep_rate": 0.3})
 
@@ -55,7 +55,7 @@ def test_a_genealogy_is_within_its_edges(n):
 
 
 def test_a_long_genealogy_lists_the_latest_steps(monkeypatch):
-    monkeypatch.setattr("gecar.plots.genealogy.MAX_STEPS", 3)
+    monkeypatch.setattr("gecar.plots.runs.genealogy.MAX_STEPS", 3)
     lineage = kept(VARIED, 7)
     most = max(
         ((6, k) for k in range(20)), key=lambda member: len(steps_of(lineage, member, program_of(lineage)))

@@ -5,8 +5,8 @@ import pytest
 
 from gecar.language.grammar import load_grammar, parse_grammar
 from gecar.language.mapping import Mapper
+from gecar.plots.runs.derivation_tree import MAX_ROWS, _limbs, tree_of
 from gecar.plots.style import is_whole
-from gecar.plots.tree import MAX_ROWS, _limbs, tree_of
 
 PAPER = Mapper(load_grammar("paper"))
 DIGITS = Mapper(parse_grammar("<s> ::= motor(<n>, <n>)\n<n> ::= <d> | <d><n>\n<d> ::= 1 | 2 | 3"))

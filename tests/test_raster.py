@@ -8,8 +8,8 @@ from shapely.geometry import MultiPolygon, Point, Polygon, box
 
 from courses import make_course
 from gecar.errors import InputError
-from gecar.world.course import load_course, parse_course
-from gecar.world.raster import draw, read_image, resample
+from gecar.world.course.course import load_course, parse_course
+from gecar.world.course.raster import draw, read_image, resample
 
 coordinate = st.floats(0.0, 0.02)
 
@@ -118,7 +118,7 @@ def test_transparency_is_white(tmp_path):
 
 
 def test_where_a_picture_ends_the_floor_is_white():
-    from gecar.world.raster import FloorImage
+    from gecar.world.course.raster import FloorImage
 
     shown = resample(FloorImage(np.zeros((9, 10), np.uint8), 1000.0), 0.01, 0.01, 0.001)
     assert shown[9].min() == 255

@@ -4,8 +4,8 @@ import pytest
 
 from benchmarks.reference_times import drive_of
 from gecar.report.drive import standing_of
-from gecar.world.course import Pose, list_courses, load_course
-from gecar.world.reference import reference_s, reference_table
+from gecar.world.course.course import Pose, list_courses, load_course
+from gecar.world.course.reference_times import reference_s, reference_table
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Drive, Outcome, World
 

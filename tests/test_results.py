@@ -22,17 +22,17 @@ from searching import MAPPER, N_ARRIVALS, SMALL, generations
 
 from gecar.calling import command
 from gecar.errors import InputError
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.history import Generation
+from gecar.evolution.state import State
 from gecar.language.program import read_program
 from gecar.results import folder as folder_module
+from gecar.results.autosave import Saver
 from gecar.results.checkpoint import pack, unpack
 from gecar.results.config import as_toml, configure, difference, merged
 from gecar.results.folder import read_history, read_result
 from gecar.results.provenance import versions
-from gecar.results.running import finish, resume, start
-from gecar.results.saving import Saver
-from gecar.search.evolution import Evolution
-from gecar.search.history import Generation
-from gecar.search.state import State
+from gecar.results.run import finish, resume, start
 
 SHORT: dict[str, Any] = {
     "executor": "serial",
@@ -178,9 +178,9 @@ def test_a_run_stopped_before_its_first_checkpoint_starts_anew(undisturbed: Path
 RUN = """
 import sys
 from pathlib import Path
-from gecar.search.executors import prepare_workers
+from gecar.parallel.executors import prepare_workers
 from gecar.results.config import configure
-from gecar.results.running import finish, resume, start
+from gecar.results.run import finish, resume, start
 if __name__ == "__main__":
     prepare_workers()
     out = Path(sys.argv[1])

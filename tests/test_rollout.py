@@ -6,11 +6,11 @@ from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.language.program import mirrored as mirrored_program
 from gecar.language.program import parse_program
-from gecar.world.course import load_course
-from gecar.world.mirror import mirrored as mirrored_course
+from gecar.world.course.course import load_course
+from gecar.world.course.course import mirrored as mirrored_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Driver, Noise, Outcome, World, simulate, simulate_many
-from gecar.world.stepped import SteppedRobot
+from gecar.world.stepped_robot import SteppedRobot
 
 EV3, PAPER = load_robot("ev3"), load_course("paper")
 WORLD = World(EV3, PAPER)

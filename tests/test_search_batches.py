@@ -18,15 +18,15 @@ from hypothesis import strategies as st
 from searching import MAPPER, SMALL, Toy, fingerprint, generations, toy_scores
 
 from gecar.errors import InputError
+from gecar.evolution.ask_tell import Evolution, run
+from gecar.evolution.state import Candidate
 from gecar.language.program import parse_program
+from gecar.parallel.executors import SerialExecutor, check_workers, open_executor
 from gecar.search import batches as batches_module
 from gecar.search.batches import Batches
 from gecar.search.evaluation import DriveEvaluator, Opcodes, recipe, unpack
-from gecar.search.evolution import Evolution, run
-from gecar.search.executors import SerialExecutor, check_workers, open_executor
 from gecar.search.fitness import UNSOLVED, Scores
-from gecar.search.state import Candidate
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
 

@@ -1,4 +1,4 @@
-"""Ask and tell: the paper's settings, elitism, the cache, resuming, and what is refused."""
+"""Ask and tell: the paper's settings, elitism, the score_cache, resuming, and what is refused."""
 
 from itertools import pairwise
 
@@ -7,10 +7,10 @@ import pytest
 from searching import MAPPER, N_ARRIVALS, SMALL, Toy, fingerprint, generations
 
 from gecar.errors import InputError
-from gecar.search import cache
-from gecar.search.evolution import Evolution, run
+from gecar.evolution import score_cache
+from gecar.evolution.ask_tell import Evolution, run
+from gecar.evolution.history import Patience, pace
 from gecar.search.fitness import UNSOLVED, invalid_scores, merit
-from gecar.search.history import Patience, pace
 from gecar.search.settings import (
     PRESETS,
     TABLE_4_CROSSOVER_RATES,
@@ -152,7 +152,7 @@ def test_programs_that_differ_only_in_their_genomes_share_a_score() -> None:
 
 def test_a_forgotten_program_is_simulated_again_with_the_same_end(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = generations(evolution("subtree, creep"), 7)
-    monkeypatch.setattr(cache, "CAPACITY", 25)
+    monkeypatch.setattr(score_cache, "CAPACITY", 25)
     small_cache = generations(evolution("subtree, creep"), 4)
     small_cache = Evolution.resume(small_cache.settings, MAPPER, small_cache.state())
     generations(small_cache, 3)

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from searching import MAPPER, SMALL
 
+from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
+from gecar.evolution.initialisation import initialise
+from gecar.evolution.mutation import Creep, Flip
+from gecar.evolution.selection import deviations, lexicase, segment_times, tournament
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
-from gecar.search.crossover import OnePoint, Subtree, VariableOnePoint
-from gecar.search.initialisation import initialise
-from gecar.search.mutation import Creep, Flip
-from gecar.search.randomness import spawn
-from gecar.search.selection import deviations, lexicase, segment_times, tournament
+from gecar.random_streams import spawn
 
 RICH = Mapper(parse_grammar("<a> ::= <a><a> | <n>\n<n> ::= 3 | 1 | 2"))
 

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from gecar.world.course import load_course
-from gecar.world.robot import load_robot
-from gecar.world.sensing import (
+from gecar.world.course.course import load_course
+from gecar.world.kernel.sensing import (
     RING,
     delayed,
     glance,
@@ -13,7 +12,8 @@ from gecar.world.sensing import (
     spot_average,
     spot_reflection,
 )
-from gecar.world.state import STATE, place
+from gecar.world.kernel.state import STATE, place
+from gecar.world.robot import load_robot
 
 EV3, PAPER = load_robot("ev3"), load_course("paper")
 RASTER, PITCH = PAPER.raster(), PAPER.pitch_m

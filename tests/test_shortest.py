@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from courses import make_course
-from gecar.world.course import load_course
-from gecar.world.layout import Layout
-from gecar.world.shortest import shortest_way
-from gecar.world.tiles import Side
+from gecar.world.course.course import load_course
+from gecar.world.course.layout import Layout
+from gecar.world.course.lower_bound.shortest_way import shortest_way
+from gecar.world.course.tiles import Side
 
 FLOOR = Layout("." * 81, 9, 1.0, 0.1)
 

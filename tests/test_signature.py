@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gecar.plots.signature import _driven, shown_size, signature_figure
+from gecar.plots.reality.signature import _driven, shown_size, signature_figure
 from gecar.plots.style import is_whole
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE
 from gecar.world.robot import load_robot
 

@@ -24,7 +24,7 @@ from gecar.reality.start_pose.localise import (
     starting_at,
     with_other_wheels,
 )
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import Robot
 
 PAPER = load_course("paper")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from gecar.errors import InputError
+from gecar.parallel.run_parallel import Workplace
 from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
 from gecar.results.cells import cells_of, difference_p
-from gecar.results.performing import perform, perform_all
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.results.study import Axis, Study, StudyFolder, read_study
-from gecar.search.workplace import Workplace
+from gecar.results.study_runs import perform, perform_all
 
 SMALL = {"workers": 1, "search": {"population": 10, "generations": 1, "codons": 50}}
 

@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from gecar.world.tiles import BY_CHARACTER, CENTRE, MIRRORED, TILES, Side
+from gecar.world.course.tiles import BY_CHARACTER, CENTRE, MIRRORED, TILES, Side
 
 
 def test_every_character_means_one_tile():

@@ -27,7 +27,7 @@ from benchmarks.transfer.table import score, table
 from benchmarks.transfer.variations import NOMINAL, Variation, draw
 from gecar.errors import InputError
 from gecar.language.program import parse_program
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 
 SOURCES = sorted((Path(__file__).parents[1] / "benchmarks" / "transfer").glob("*.py"))
 COURSES = ("paper", "chicane", "figure_eight", "gaps", "hairpin", "maze", "s_bends")

@@ -9,7 +9,7 @@ import numpy as np
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording, write_recording
 from gecar.reality.recordings.setup import Setup
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Noise, World, simulate
 

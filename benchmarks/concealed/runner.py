@@ -112,7 +112,7 @@ def run_all(
         If Dask is not installed, or does not answer.
     """
     # The one thing taken from gecar: where calls are run. It knows nothing of robots.
-    from gecar.search.workplace import Workplace, as_they_end  # noqa: PLC0415
+    from gecar.parallel.run_parallel import Workplace, as_they_end  # noqa: PLC0415
 
     wanted = sorted(path.name for path in cases.iterdir() if path.is_dir()) if names is None else names
     waiting = [name for name in wanted if not (verdicts / name / "verdict.json").exists()]

@@ -18,7 +18,7 @@ from benchmarks.paper_robot.twin import LONG_SIDE, MEAN_S, stretched
 from gecar.files import write_whole
 from gecar.plots.style import save
 from gecar.report.table import piped
-from gecar.world.course import Course, parse_course
+from gecar.world.course.course import Course, parse_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome
 

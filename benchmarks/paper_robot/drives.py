@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.language.program import parse_program
-from gecar.world.course import Course, load_course
+from gecar.world.course.course import Course, load_course
+from gecar.world.kernel.state import derive
 from gecar.world.robot import load_robot
 from gecar.world.rollout import STEP_S, Drive, Driver, World
-from gecar.world.state import derive
 
 Floats = npt.NDArray[np.float64]
 

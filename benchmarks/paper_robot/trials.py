@@ -17,7 +17,7 @@ from benchmarks.paper_robot.twin import LONG_SIDE, NOISE_PCT, PLACED_DEG, PLACED
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, write_recording
 from gecar.reality.recordings.synthetic import rehearsal
-from gecar.world.course import Course, Pose
+from gecar.world.course.course import Course, Pose
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.paper_robot.drives import Fleet, Floats, moved
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Outcome
 

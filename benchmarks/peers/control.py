@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from gecar.language.opcodes import JUMP, MOTOR, TEST
-from gecar.world.course import Course
+from gecar.world.course.course import Course
+from gecar.world.kernel.sensing import spot_average
 from gecar.world.robot import Robot
-from gecar.world.sensing import spot_average
 
 Pose = tuple[float, float, float]
 

@@ -14,14 +14,14 @@ import numpy as np
 from benchmarks.peers.control import Eye, Pose, drive
 from benchmarks.peers.engines import ENGINES
 from benchmarks.peers.mappers import LIBRARIES, agree, genomes
+from gecar.evolution.ask_tell import rehearse
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import parse_program
 from gecar.results.config import configure
-from gecar.results.running import load_task
+from gecar.results.run import load_task
 from gecar.search.batches import Batches
-from gecar.search.evolution import rehearse
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

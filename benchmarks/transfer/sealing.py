@@ -13,7 +13,7 @@ from gecar.errors import InputError, expected
 from gecar.files import read_text, write_whole
 from gecar.language.program import parse_program
 from gecar.results.config import configure, read_config
-from gecar.results.running import load_task
+from gecar.results.run import load_task
 from gecar.world.rollout import Drive, Outcome, simulate
 
 MANIFEST = "manifest.json"

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gecar.brick import keeping_py, main_py
-from gecar.brick.words import READERS, function_text
+from gecar.brick import calibration_template, main_template
+from gecar.brick.python_source import READERS, function_text
 from gecar.errors import expected
 from gecar.language.program import Program
 from gecar.language.statements import If, Sensor, Statement
@@ -106,11 +106,11 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
     sensors = [sensor for sensor in Sensor if sensor in program.sensors] or [Sensor.CENTRE]
     second = target == "pybricks2"
     text = (
-        main_py.TOP
+        main_template.TOP
         + function_text(program.statements)
-        + main_py.DRIVING
-        + (keeping_py.KEEP_IN_FILE if second else keeping_py.KEEP_IN_STORAGE)
-        + main_py.RUN
+        + main_template.DRIVING
+        + (calibration_template.KEEP_IN_FILE if second else calibration_template.KEEP_IN_STORAGE)
+        + main_template.RUN
     )
     words = (
         _robot_words(robot, ports)
@@ -119,7 +119,7 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
     )
     for name, word in words.items():
         text = text.replace(f"[[{name}]]", word)
-    return main_py.SHEBANG + text if second else text
+    return main_template.SHEBANG + text if second else text
 
 
 def _robot_words(robot: Robot, ports: Ports) -> dict[str, str]:

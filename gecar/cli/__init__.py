@@ -1,1 +1,1 @@
-"""Commands: parse, load, call, save; one module each."""
+"""The command line: parse, load, call, save."""

@@ -23,7 +23,7 @@ EVOLVE, COURSES, ROBOT = "Evolve", "Courses, robots and grammars", "The real rob
 
 
 @dataclass(frozen=True)
-class Seat:
+class CommandEntry:
     """A command's place in the list.
 
     Attributes
@@ -35,7 +35,7 @@ class Seat:
     words
         One line of help.
     place
-        Module in `gecar.cli`, and its function or `typer.Typer`: ``evolve:evolve``.
+        Module in `gecar.cli.commands`, and its function or `typer.Typer`: ``evolve:evolve``.
     """
 
     name: str
@@ -46,12 +46,12 @@ class Seat:
     @property
     def exists(self) -> bool:
         """Whether its module is there."""
-        return find_spec(f"gecar.cli.{self.place.partition(':')[0]}") is not None
+        return find_spec(f"gecar.cli.commands.{self.place.partition(':')[0]}") is not None
 
     def load(self) -> Any:
         """Import it, as a command of the command line."""
         module, _, attribute = self.place.partition(":")
-        found = getattr(import_module(f"gecar.cli.{module}"), attribute)
+        found = getattr(import_module(f"gecar.cli.commands.{module}"), attribute)
         if isinstance(found, typer.Typer):
             command = typer.main.get_command(found)
         else:
@@ -70,41 +70,47 @@ def reflowed(text: str) -> str:
     return "\n\n".join(joined)
 
 
-SEATS = (
-    Seat("evolve", EVOLVE, "Evolve a program that brings the robot round a course.", "evolve:evolve"),
-    Seat(
+COMMANDS = (
+    CommandEntry("evolve", EVOLVE, "Evolve a program that brings the robot round a course.", "evolve:evolve"),
+    CommandEntry(
         "simulate", EVOLVE, "Drive a program in the simulation; draw or film the drive.", "simulate:simulate"
     ),
-    Seat("plot", EVOLVE, "Draw a run's pictures again, or several runs beside each other.", "plot:plot"),
-    Seat("table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"),
-    Seat("check", EVOLVE, "Compare a table of fitness figures with a fresh run.", "check:check"),
-    Seat("course", COURSES, "List, show, print and make courses.", "course:course"),
-    Seat("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
-    Seat("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
-    Seat("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
-    Seat("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
-    Seat("motor", ROBOT, "Draw the motor's speed against input and power: Figs 7, 8.", "motor:motor"),
-    Seat("compare", ROBOT, "Set simulation beside recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"),
-    Seat("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
-    Seat("discover", ROBOT, "Find which physics the simulation left out.", "discover:discover"),
-    Seat("effects", ROBOT, "List the physics a simulation may have left out.", "effects:effects"),
+    CommandEntry(
+        "plot", EVOLVE, "Draw a run's pictures again, or several runs beside each other.", "plot:plot"
+    ),
+    CommandEntry(
+        "table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"
+    ),
+    CommandEntry("check", EVOLVE, "Compare a table of fitness figures with a fresh run.", "check:check"),
+    CommandEntry("course", COURSES, "List, show, print and make courses.", "course:course"),
+    CommandEntry("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
+    CommandEntry("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
+    CommandEntry("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
+    CommandEntry("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
+    CommandEntry("motor", ROBOT, "Draw the motor's speed against input and power: Figs 7, 8.", "motor:motor"),
+    CommandEntry(
+        "compare", ROBOT, "Set simulation beside recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"
+    ),
+    CommandEntry("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
+    CommandEntry("discover", ROBOT, "Find which physics the simulation left out.", "discover:discover"),
+    CommandEntry("effects", ROBOT, "List the physics a simulation may have left out.", "effects:effects"),
 )
 
 
 class Commands(TyperGroup):
-    """A group whose commands are listed from `SEATS` and imported when called."""
+    """A group whose commands are listed from `COMMANDS` and imported when called."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self._seats = {seat.name: seat for seat in SEATS if seat.exists}
-        for seat in self._seats.values():
-            self.add_command(TyperCommand(seat.name, help=seat.words, rich_help_panel=seat.panel))
+        self._entries = {entry.name: entry for entry in COMMANDS if entry.exists}
+        for entry in self._entries.values():
+            self.add_command(TyperCommand(entry.name, help=entry.words, rich_help_panel=entry.panel))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Put the real command in the place of its line in the list."""
         name, command, rest = super().resolve_command(ctx, args)
-        if name in self._seats:
-            command = self._seats[name].load()
+        if name in self._entries:
+            command = self._entries[name].load()
             command.name = name
         return name, command, rest
 

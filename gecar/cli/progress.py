@@ -10,8 +10,8 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from gecar.evolution.history import Generation, pace
 from gecar.search.fitness import UNSOLVED
-from gecar.search.history import Generation, pace
 
 PLAIN_EVERY_S = 5.0
 

@@ -27,7 +27,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from gecar.errors import InputError, expected
-from gecar.language.place import place
+from gecar.language.source_position import place
 
 MAX_CHARACTERS = 100_000
 MAX_ALTERNATIVES = 256  # a codon is 0..255: no codon could choose the 257th

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from gecar.errors import InputError, expected
 from gecar.language import opcodes
-from gecar.language.place import place
+from gecar.language.source_position import place
 from gecar.language.statements import Comparison, Condition, Sensor
 
 MAX_DEPTH = 100  # of ifs and parentheses within each other

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gecar.errors import InputError, expected
 from gecar.files import is_file, is_folder, read_text, shipped
 from gecar.language.bnf import RawRule, Reference, parse_rules
-from gecar.language.place import place, plain
+from gecar.language.source_position import place, plain
 
 MAX_NONTERMINALS = 1_000
 GRAMMARS = shipped("grammars")

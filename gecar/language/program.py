@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gecar.files import read_text
 from gecar.language import opcodes
-from gecar.language.place import plain
+from gecar.language.source_position import plain
 from gecar.language.statements import Condition, If, Motor, MotorUntil, Sensor, Statement
 from gecar.language.syntax import parse_statements
 

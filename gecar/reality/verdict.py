@@ -186,7 +186,7 @@ class Verdict:
         InputError
             If there is no such picture.
         """
-        drawings = _above("plots.discovery").verdict_drawings(self)
+        drawings = _above("plots.reality.verdict").verdict_drawings(self)
         if picture not in drawings:
             raise expected("picture", f"'{picture}'", f"one of {', '.join(drawings)}")
         figure: Figure = drawings[picture](self)

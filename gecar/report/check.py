@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from gecar.results.guard import Move
+from gecar.results.fitness_table import Move
 
 
 def moves_table(moves: Sequence[Move]) -> Table:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gecar.world.course import Course
-from gecar.world.reference import reference_s
+from gecar.world.course.course import Course
+from gecar.world.course.reference_times import reference_s
 from gecar.world.rollout import Drive, Outcome, World
 
 PAPER_BEST_S = 16.74

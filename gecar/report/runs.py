@@ -1,4 +1,4 @@
-"""Several runs in words: what they share, and what each kind came to."""
+"""Runs in words: what came of one, what several share, and what each kind came to."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from gecar.report.drive import short_arrival
 from gecar.results.config import Config
+from gecar.world.course.course import load_course
 
 _NAMES = {"crossover_rate": "crossover", "mutation_rate": "mutation"}
 
@@ -73,3 +75,36 @@ def summary_table(groups: Mapping[str, Mapping[str, Any]]) -> Table:
         )
         table.add_row(name, str(group["runs"]), str(group["solved"]), *times, f"{group['evaluations']:,}")
     return table
+
+
+def run_title(config: Config, result: Mapping[str, Any]) -> str:
+    """Say in a few words what came of a run."""
+    course = load_course(config.course)
+    where = course.title or course.name
+    if result["solved"]:
+        words = f"{where}: GOAL in {result['fitness_s']:.2f} s after {result['generations']} generations"
+        return ", ".join(filter(None, [words, short_arrival(result.get("arrives"))]))
+    return f"{where}: no program at GOAL after {result['generations']} generations"
+
+
+def run_detail(config: Config, result: Mapping[str, Any]) -> str:
+    """Say what a run was: search, seed and effort."""
+    search = config.search
+    return " · ".join(
+        [
+            f"preset {config.preset}",
+            f"crossover {search.crossover_rate:g}, mutation {search.mutation_rate:g}",
+            f"seed {config.seed}",
+            f"{result['evaluations']:,} evaluations, {result['distinct_evaluations']:,} simulated",
+            f"{result['wall_s']:.1f} s",
+        ]
+    )
+
+
+def effort_of(result: Mapping[str, Any]) -> str:
+    """Say how much work a run was, and how fast it went."""
+    rate = result["evaluations"] / max(result["wall_s"], 1e-3)
+    return (
+        f"{result['evaluations']:,} evaluations in {result['wall_s']:.1f} s ({rate:,.0f}/s); "
+        f"{result['distinct_evaluations']:,} programs differed and were simulated."
+    )

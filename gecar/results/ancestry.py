@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gecar.errors import InputError, expected
+from gecar.evolution.lineage import Lineage, Member
+from gecar.evolution.state import State
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import Program
 from gecar.results.config import configure, read_config
 from gecar.results.folder import RunFolder
-from gecar.results.running import load_task
-from gecar.search.lineage import Lineage, Member
-from gecar.search.state import State
+from gecar.results.run import load_task
 
 
 @dataclass(frozen=True)

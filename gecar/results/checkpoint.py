@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from gecar.errors import InputError, expected
+from gecar.evolution.history import HISTORY
+from gecar.evolution.lineage import MAX_BYTES
+from gecar.evolution.phenotypes import DIGEST_BYTES
+from gecar.evolution.state import State
 from gecar.search.fitness import score_type
-from gecar.search.history import HISTORY
-from gecar.search.lineage import MAX_BYTES
-from gecar.search.phenotypes import DIGEST_BYTES
-from gecar.search.state import State
 
 _MAGIC = b"gecar checkpoint "
 _VERSION = b"3"

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gecar.errors import expected, first_fault
 from gecar.files import is_file, read_toml
 from gecar.language.mapping import MappingOptions
-from gecar.search.executors import MAX_WORKERS, usable_cores
+from gecar.parallel.executors import MAX_WORKERS, usable_cores
 from gecar.search.settings import Settings, preset
 from gecar.world.rollout import STEP_S
 

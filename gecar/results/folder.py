@@ -16,14 +16,14 @@ import numpy.typing as npt
 
 from gecar.calling import command
 from gecar.errors import InputError, expected
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.history import Generation
+from gecar.evolution.state import State
 from gecar.files import read_text, write_whole
 from gecar.results.checkpoint import pack, unpack
-from gecar.search.evolution import Evolution
-from gecar.search.history import Generation
-from gecar.search.state import State
 
 REQUIRED = ("generation", "best", "mean", "valid", "distinct", "evaluations", "wall_s")
-"""Columns every history.csv has; see `gecar.search.history.Generation`."""
+"""Columns every history.csv has; see `gecar.evolution.history.Generation`."""
 
 FILES = ("config.toml", "history.csv", "best.txt", "result.json", "checkpoint")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gecar import __version__
 from gecar.language.grammar import Grammar
-from gecar.world.course import Course
+from gecar.world.course.course import Course
 from gecar.world.robot import Robot
 
 _LIBRARIES = ("numpy", "numba", "pymunk", "scipy", "shapely")

@@ -21,7 +21,7 @@ from gecar.language.grammar import load_grammar
 from gecar.results.config import NOT_PART_OF_THE_RESULT, Config, configure, identify, merged
 from gecar.results.provenance import fingerprints, versions
 from gecar.search.settings import TABLE_4_CROSSOVER_RATES, TABLE_4_MUTATION_RATES, Settings
-from gecar.world.course import load_course
+from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 
 MAX_RUNS = 100_000

@@ -1,1 +1,1 @@
-"""Grammatical Evolution: variation, fitness, evaluation, and the evolution itself as ask and tell."""
+"""Programs for the robot: fitness, arrival under drawn conditions, evaluation."""

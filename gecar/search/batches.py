@@ -13,11 +13,11 @@ from typing import Self
 import numpy as np
 
 from gecar.errors import InputError
+from gecar.evolution.state import Candidate
 from gecar.language.opcodes import N_COLUMNS
+from gecar.parallel.executors import MAX_DEATHS, QUIET_S, SerialExecutor
 from gecar.search.evaluation import Batch, Evaluator, Scored, recipe, score_batch
-from gecar.search.executors import MAX_DEATHS, QUIET_S, SerialExecutor
 from gecar.search.fitness import Scores
-from gecar.search.state import Candidate
 
 LONGEST_S = 0.1
 """Longest batch aimed at: long enough that sending it costs nothing, short enough to share work evenly."""

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.search.fitness import UNSOLVED
-from gecar.world.conditions import joined
+from gecar.world.kernel.conditions import joined
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from gecar.search.chance import FIRST_DRAWS, MARGIN, ROUNDS, pool
 from gecar.search.fitness import UNSOLVED, Scores, score_type
-from gecar.world.conditions import Conditions
+from gecar.world.kernel.conditions import Conditions
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from gecar.errors import expected
-from gecar.world.conditions import Conditions, conditions, select
+from gecar.world.kernel.conditions import Conditions, conditions, select
 from gecar.world.rollout import Drive, Driver, World
 
 MOST = 10_000

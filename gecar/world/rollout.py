@@ -12,16 +12,16 @@ import numpy.typing as npt
 
 from gecar.errors import expected
 from gecar.language.opcodes import N_COLUMNS, TEST
-from gecar.world.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
-from gecar.world.conditions import Conditions, conditions, select
-from gecar.world.course import Course
-from gecar.world.driving import drive
-from gecar.world.interpreter import CONTROL, EYES, Floor
-from gecar.world.lanes import Ends, Jobs, drive_lanes, make_memory
+from gecar.world.course.course import Course
+from gecar.world.kernel.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.kernel.conditions import Conditions, conditions, select
+from gecar.world.kernel.drive import drive
+from gecar.world.kernel.interpreter import CONTROL, EYES, Floor
+from gecar.world.kernel.lanes import Ends, Jobs, drive_lanes, make_memory
+from gecar.world.kernel.sensing import RING
+from gecar.world.kernel.state import STATE
+from gecar.world.pymunk_space import build_engine
 from gecar.world.robot import Robot
-from gecar.world.sensing import RING
-from gecar.world.space import build_engine
-from gecar.world.state import STATE
 
 STEP_S = 0.002  # benchmarks/convergence.py shows what halving it moves
 TRACE_S = 0.01

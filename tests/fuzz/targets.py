@@ -23,11 +23,11 @@ from gecar.reality.recordings.recording import Recording, read_recording, write_
 from gecar.reality.recordings.setup import Setup
 from gecar.results.checkpoint import unpack
 from gecar.results.config import as_toml, configure, read_config
+from gecar.results.fitness_table import read_table
 from gecar.results.folder import read_history, read_result
-from gecar.results.guard import read_table
 from gecar.results.study import read_study
-from gecar.world.course import load_course
-from gecar.world.raster import read_image
+from gecar.world.course.course import load_course
+from gecar.world.course.raster import read_image
 from gecar.world.robot import Robot, load_robot, read_robot, write_robot
 from gecar.world.rollout import World, simulate
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.concealed.comparators.methods import METHODS, changed
 from benchmarks.concealed.comparators.sparse import sparse_regression
-from gecar.cli.voice import plain
+from gecar.cli.output import plain
 from gecar.files import write_whole
 from gecar.reality import discovery
 from gecar.reality.recordings.recording import Case, read_case

@@ -18,7 +18,7 @@ from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.verdict import Found, NextRecording
-from gecar.world.course import Course, load_course
+from gecar.world.course.course import Course, load_course
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]

@@ -21,7 +21,7 @@ from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import Replay, replay
-from gecar.world.course import Course
+from gecar.world.course.course import Course
 from gecar.world.robot import Robot
 from gecar.world.rollout import Outcome, World, simulate
 

@@ -19,10 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
-from gecar.world.bench import bench_step
-from gecar.world.dynamics import drift, step
-from gecar.world.motor import supply
-from gecar.world.state import derive, place
+from gecar.world.kernel.dynamics import drift, step
+from gecar.world.kernel.motor import bench_step, supply
+from gecar.world.kernel.state import derive, place
 
 Array = npt.NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
-from gecar.world.sensing import spot_reflection
+from gecar.world.kernel.sensing import spot_reflection
 
 Array = npt.NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def readings_along(
     noise
         Standard deviation of a reading [%].
     raster, pitch
-        The floor, as in `gecar.world.sensing.spot_reflection`.
+        The floor, as in `gecar.world.kernel.sensing.spot_reflection`.
     physics
         Record of dtype `PHYSICS`, shape (1,).
     shift

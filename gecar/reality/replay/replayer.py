@@ -17,9 +17,9 @@ from scipy.optimize import least_squares
 from gecar.reality.recordings.camera_frame import axle_pose
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, KernelInput, replay_rows
+from gecar.world.kernel.state import DERIVED, STATE
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
-from gecar.world.state import DERIVED, STATE
 
 Array = npt.NDArray[np.float64]
 DEG = np.pi / 180.0

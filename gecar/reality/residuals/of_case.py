@@ -19,7 +19,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.residuals.threads import Threads
-from gecar.world.course import Course, load_course
+from gecar.world.course.course import Course, load_course
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -23,7 +23,7 @@ from gecar.reality.replay.smoothed_path import measured_path
 from gecar.reality.residuals.nuisances import Nuisances, SensorPath
 from gecar.reality.start_pose.localise import bare_floor, find_start, starting_at
 from gecar.reality.start_pose.refine import refined
-from gecar.world.course import Course
+from gecar.world.course.course import Course
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

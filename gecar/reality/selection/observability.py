@@ -8,7 +8,7 @@ import numpy as np
 
 from gecar.reality.residuals.of_case import Residuals
 from gecar.world.effects import Effect
-from gecar.world.motor import FULL_DUTY
+from gecar.world.kernel.motor import FULL_DUTY
 
 
 def observable(catalogue: Sequence[Effect], residuals: Residuals) -> tuple[str, ...]:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.ndimage import zoom
 
 from gecar.compiled import compiled
-from gecar.world.course import Course
-from gecar.world.sensing import spot_average
+from gecar.world.course.course import Course
+from gecar.world.kernel.sensing import spot_average
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]

@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from gecar.reality.optimisation.least_squares import KNEE, least_squares
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.start_pose.grid_search import FINE_SPOT_M, SAME_M, SAME_RAD, likely_starts, near
-from gecar.world.course import Course
+from gecar.world.course.course import Course
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]

@@ -1,0 +1,1 @@
+"""What commands do, where that is much: load, call, save, tell."""

@@ -1,0 +1,168 @@
+"""What ``gecar discover`` makes of a case; and of several, each whole in one worker, here or on a cluster."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Future
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import typer
+
+from gecar.cli.output import Output, plain
+from gecar.errors import InputError
+from gecar.files import write_whole
+from gecar.parallel.run_parallel import Workplace, perform_each
+from gecar.reality.discovery import discover
+from gecar.reality.recordings.recording import Case
+from gecar.reality.verdict import Verdict
+from gecar.report.verdict import sentences
+from gecar.world.robot import Robot, write_robot
+
+
+@dataclass(frozen=True)
+class Task:
+    """A case and how it is to be looked at; it travels to whoever does it.
+
+    Attributes
+    ----------
+    case
+        The recordings.
+    holdout, robot, seed, workers, with_formula
+        As `gecar.reality.discovery.discover`.
+    pictures
+        Whether to draw.
+    """
+
+    case: Case
+    holdout: Sequence[str]
+    robot: Robot | None
+    seed: int
+    workers: int | None
+    with_formula: bool
+    pictures: bool
+
+
+class Told(NamedTuple):
+    """What a verdict comes to: its sentences, its JSON object, and its files if they were made elsewhere."""
+
+    sentences: list[str]
+    table: dict[str, Any]
+    files: dict[str, bytes]
+
+
+def _keep_still(line: str) -> None:
+    """Say nothing."""
+
+
+def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -> Told:
+    """Discover what a case's simulation lacks, and write the verdict's files into a folder, made at the end.
+
+    Raises
+    ------
+    InputError
+        As `gecar.reality.discovery.discover`.
+    """
+    verdict = discover(task.case, task.holdout, task.robot, task.seed, task.workers, tell, task.with_formula)
+    out.mkdir(parents=True, exist_ok=True)
+    table = plain(verdict.as_json())
+    write_whole(out / "verdict.json", json.dumps(table, indent=1, allow_nan=False) + "\n")
+    write_robot(verdict.robot, out / "robot.toml")
+    if task.pictures:
+        tell("pictures")
+        _draw(verdict, out)
+    return Told(sentences(verdict), table, {})
+
+
+def conclude_away(task: Task, tell: Callable[[str], None] = _keep_still) -> Told:
+    """Do the same where the sender's folders need not be, and hand the files back."""
+    with tempfile.TemporaryDirectory(prefix="verdict-") as folder:
+        tell(f"{task.case.name}:")
+        told = conclude(task, Path(folder), tell)
+        return told._replace(files={path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())})
+
+
+def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers: int, scheduler: str) -> None:
+    """Conclude cases side by side, write each as it ends, and name those that failed.
+
+    Parameters
+    ----------
+    output
+        Where words go.
+    tasks
+        By the folder each goes to.
+    kind, workers, scheduler
+        As `gecar.parallel.executors.open_executor`.
+
+    Raises
+    ------
+    InputError
+        If there is no such executor, or Dask does not answer.
+    typer.Exit
+        If a case failed: code 2 for bad input alone, 1 if a fault of gecar's own is among it.
+    """
+    answers: dict[Path, dict[str, Any]] = {}
+    failed: dict[Path, Exception] = {}
+
+    def keep(out: Path, future: Future[Told]) -> None:
+        error = future.exception()
+        if isinstance(error, BrokenExecutor):
+            raise error
+        if isinstance(error, Exception):
+            failed[out] = error
+        else:
+            answers[out] = _written(output, out, future.result())
+
+    place = Workplace.of(kind, workers, scheduler)
+    work = partial(conclude_away, tell=teller(output)) if kind == "serial" else conclude_away
+    try:
+        perform_each(place, work, list(tasks.items()), keep)
+    except InputError as error:  # workers that die again and again, a scheduler that went away
+        failed |= {out: error for out in tasks if out not in answers and out not in failed}
+    for out, why in failed.items():
+        words = f"{'' if isinstance(why, InputError) else f'internal error: {type(why).__name__}: '}{why}"
+        print(f"error: {tasks[out].case.name}: {words}", file=sys.stderr)
+        answers[out] = {"error": words}
+    named = {out.name: answers[out] for out in tasks}
+    output.print_json(named if len(tasks) > 1 else next(iter(answers.values())))
+    if failed:
+        raise typer.Exit(2 if all(isinstance(why, InputError) for why in failed.values()) else 1)
+
+
+def teller(output: Output) -> Callable[[str], None]:
+    """Return what says lines of progress."""
+    return lambda line: output.print(f"  {line}", style="dim")
+
+
+def say(output: Output, told: Told, out: Path) -> None:
+    """Say a verdict, and where it is."""
+    for line in told.sentences:
+        output.print(line)
+    output.print(f"Written to {out}.")
+
+
+def _written(output: Output, out: Path, told: Told) -> dict[str, Any]:
+    """Write and say what was made elsewhere; return the JSON object."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name, content in told.files.items():
+        write_whole(out / name, content)
+    output.print(f"{out.name}:")
+    say(output, told, out)
+    return told.table
+
+
+def _draw(verdict: Verdict, out: Path) -> None:
+    """Write the pictures, and report.html with the pictures inside."""
+    from gecar.plots.reality.verdict import verdict_figures
+    from gecar.plots.style import save
+    from gecar.report.verdict_page import verdict_page
+
+    paths = {name: save(figure, out / f"{name}.png") for name, figure in verdict_figures(verdict).items()}
+    write_whole(
+        out / "report.html", verdict_page(verdict, {name: path.read_bytes() for name, path in paths.items()})
+    )

@@ -1,0 +1,122 @@
+"""A run of ``gecar evolve``, from its start to what is told of it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gecar.calling import command
+from gecar.cli.actions.run_pictures import draw_run
+from gecar.cli.inputs import drive_seed
+from gecar.cli.output import Output
+from gecar.cli.progress import Watch
+from gecar.compiled import is_cold, mark_warm
+from gecar.report.drive import arrival_of, sentence_of, standing_of
+from gecar.report.runs import effort_of
+from gecar.results.config import configure, merged, read_config
+from gecar.results.run import Started, finish, resume, start
+from gecar.search.settings import DEFAULT_PRESET
+from gecar.world.rollout import simulate
+
+
+def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: bool) -> Started:
+    """Start a run, or go on with one.
+
+    Parameters
+    ----------
+    file
+        Settings; where neither it nor the options name a preset, it is `DEFAULT_PRESET`.
+    changes
+        Options, laid over them.
+    out
+        The run's folder; by default named by course, preset and seed.
+    again
+        Whether to go on in it.
+
+    Raises
+    ------
+    InputError
+        As `gecar.results.run.start` or `resume`.
+    """
+    table = merged({"preset": DEFAULT_PRESET} | (read_config(file) if file else {}), changes)
+    wanted = configure(table, file or "options")
+    folder = out or Path("runs") / f"{Path(wanted.course).stem}-{wanted.preset}-seed{wanted.seed}"
+    return resume(folder, table if file else changes) if again else start(wanted, folder)
+
+
+def run_to_the_end(output: Output, started: Started, pictures: bool, quiet: bool) -> None:
+    """Run, draw and tell; Ctrl-C ends it with the run saved.
+
+    Parameters
+    ----------
+    output
+        Where words go.
+    started
+        New or resumed.
+    pictures, quiet
+        Whether to draw; whether to keep still until the end.
+    """
+    if not quiet:
+        _announce(output, started)
+    result = _finish(started, quiet)
+    mark_warm()
+    drawn = [str(path) for path in draw_run(started.folder.path)] if pictures else []
+    _tell(output, started, result, drawn)
+    world = started.task.world
+    output.print_json(
+        {
+            **{name: value for name, value in result.items() if name != "genome"},
+            "lower_bound_s": world.course.lower_bound_s(world.robot),
+            "folder": str(started.folder.path),
+            "pictures": drawn,
+        }
+    )
+
+
+def _announce(output: Output, started: Started) -> None:
+    settings, course = started.evolution.settings, started.task.world.course
+    output.print(
+        f"Evolving on {course.title or course.name}: {settings.population} programs, "
+        f"{settings.generations} generations, preset {started.task.config.preset}, seed {started.evolution.seed}"
+    )
+    if started.evolution.history:
+        output.print(f"Going on after generation {started.evolution.generation}")
+    if is_cold():
+        print("Compiling the simulation; this once, it takes about 20 s ...", file=sys.stderr, flush=True)
+
+
+def _finish(started: Started, quiet: bool) -> dict[str, Any]:
+    evolution = started.evolution
+    try:
+        with Watch(evolution.history, evolution.settings.generations, quiet) as watch:
+            return finish(started, watch)
+    except KeyboardInterrupt:  # how to go on has been said
+        raise typer.Exit(130) from None
+
+
+def _tell(output: Output, started: Started, result: dict[str, Any], pictures: list[str]) -> None:
+    """Print the best program, how good it is, and where everything lies."""
+    folder, best, world = started.folder.path, started.evolution.best, started.task.world
+    if best.program is None:
+        output.print("\nNo genome mapped to a program.\n", style="bold")
+    else:
+        output.print(f"\nThe best program, found in generation {best.generation}:\n")
+        output.print(
+            "\n".join(f"    {line}" for line in best.program.source.splitlines()) + "\n", style="bold"
+        )
+        seed = drive_seed(None, {"seed": started.evolution.seed}, best.program)
+        drive = simulate(world, best.program.opcodes, seed)
+        output.print(sentence_of(drive))
+        output.print(standing_of(world, drive))
+        output.print(arrival_of(result["arrives"]))
+        same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
+        output.print(f"With pymunk moving the body, the drive {same}.")
+    output.print(effort_of(result))
+    output.print(f"\nResults:  {folder}")
+    for picture in pictures:
+        output.print(f"Picture:  {picture}")
+    if best.program is not None:
+        output.print(f"Film it:  {command()} simulate {folder} --animate drive.gif")

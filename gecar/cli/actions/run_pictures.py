@@ -1,0 +1,199 @@
+"""A run's pictures, drawn from its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gecar.cli.inputs import build_world, drive_seed, find_program, read_run_config
+from gecar.cli.output import Output
+from gecar.errors import expected
+from gecar.language.program import read_program
+from gecar.plots.drives.classroom import write_classroom_page
+from gecar.plots.drives.trajectory import trajectory
+from gecar.plots.runs.compare_runs import compare_runs
+from gecar.plots.runs.convergence import Reference, convergence
+from gecar.plots.runs.derivation_tree import tree_of
+from gecar.plots.runs.evolution_film import Champion, film_evolution
+from gecar.plots.runs.genealogy import genealogy
+from gecar.plots.style import save
+from gecar.report.drive import PAPER_BEST_S, detail_of, short_arrival, title_of
+from gecar.report.runs import group_names, run_detail, run_title, summaries, summary_table
+from gecar.results.ancestry import Ancestry, read_ancestry
+from gecar.results.config import Config
+from gecar.results.folder import read_history, read_result
+from gecar.results.run import load_task
+from gecar.world.course.course import load_course
+from gecar.world.perturbation import under_drawn_conditions
+from gecar.world.robot import load_robot
+from gecar.world.rollout import World, simulate
+
+SHOWN = 20
+"""Drives under drawn conditions that a picture shows."""
+
+
+def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
+    """Draw a run's convergence and its best program's drive.
+
+    Parameters
+    ----------
+    folder
+        The run's.
+    out
+        Where the pictures go; by default into the run's folder.
+
+    Returns
+    -------
+    list
+        What was drawn; no drive where no genome mapped to a program.
+
+    Raises
+    ------
+    InputError
+        If the folder is no finished run's, or what it names can not be loaded.
+    """
+    target = out or folder
+    target.mkdir(parents=True, exist_ok=True)
+    drawn = [draw_convergence(folder, target / "convergence.png")]
+    if read_result(folder)["program"]:
+        drawn.append(draw_trajectory(folder, target / "trajectory.png"))
+    return drawn
+
+
+def study_run(folder: Path, out: Path | None = None) -> list[Path]:
+    """Draw all of a run's pictures: those of `draw_run`, its best program's derivation, and who that descends from."""
+    target = out or folder
+    drawn = draw_run(folder, target)
+    if read_result(folder)["program"]:
+        drawn += [
+            draw_tree(folder, target / "tree.png"),
+            draw_genealogy(folder, target / "genealogy.png"),
+        ]
+    return drawn
+
+
+def draw_convergence(folder: Path, target: Path) -> Path:
+    """Draw a run's convergence."""
+    config, history, result = read_run_config(folder), read_history(folder), read_result(folder)
+    title, detail = run_title(config, result), run_detail(config, result)
+    return save(convergence(history, references(config), title, detail), target)
+
+
+def draw_trajectory(folder: Path, target: Path) -> Path:
+    """Draw the drive of a run's best program, as the run scored it."""
+    file, settings = find_program(folder)
+    world, program = build_world(settings), read_program(file)
+    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+    title, detail = title_of(drive, world.course), detail_of(world, drive)
+    share = short_arrival(read_result(folder).get("arrives"))
+    others = under_drawn_conditions(world, program.opcodes, SHOWN)
+    detail += f" · thin: {SHOWN} drives under other conditions"
+    title = ", ".join(filter(None, [title, share]))
+    return save(trajectory(world, program, drive, title=title, detail=detail, others=others), target)
+
+
+def draw_tree(folder: Path, target: Path) -> Path:
+    """Draw the derivation of a run's best program.
+
+    Raises
+    ------
+    InputError
+        If the folder is no run's, or its run found no program.
+    """
+    mapper = load_task(read_run_config(folder)).mapper
+    return save(tree_of(mapper, read_result(folder)["genome"]), target)
+
+
+def draw_genealogy(folder: Path, target: Path) -> Path:
+    """Draw who a run's best program descends from; see `gecar.results.ancestry.read_ancestry`."""
+    ancestry, config, result = read_ancestry(folder), read_run_config(folder), read_result(folder)
+    line, family = ancestry.lineage.line(ancestry.winner), ancestry.lineage.family(ancestry.winner)
+    found, ancestors = ancestry.winner[0], sum(map(len, family)) - 1
+    detail = (
+        f"found in generation {found} · {ancestors:,} ancestors, {len(line) - 1:,} of them in its own line"
+    )
+    detail += f" · preset {config.preset}, seed {config.seed}"
+    figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, run_title(config, result), detail)
+    return save(figure, target)
+
+
+def film_run(folder: Path, target: Path) -> Path:
+    """Film the best program of each generation of a run that brought a better one.
+
+    Raises
+    ------
+    InputError
+        If the target's ending is no film's, no program was found, or as `gecar.results.ancestry.read_ancestry`.
+    """
+    ancestry, (_, settings) = read_ancestry(folder), find_program(folder)
+    world = build_world(settings)
+    champions = _champions(ancestry, world, settings)
+    if not champions:
+        raise expected(folder, "a run that found no program", "one that did")
+    return film_evolution(world, champions, read_history(folder), target)
+
+
+def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
+    """Drive the best program of each generation that brought a better one, as the run scored it."""
+    champions = []
+    for member in ancestry.lineage.champions():
+        program = ancestry.program(member)
+        if program is not None:
+            drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+            title = f"Generation {member[0]} · {title_of(drive, world.course)}"
+            champions.append(Champion(member[0], program, drive, title))
+    return champions
+
+
+def write_drive_page(folder: Path, target: Path) -> Path:
+    """Write a page that plays the drive of a run's best program, as the run scored it.
+
+    Raises
+    ------
+    InputError
+        If the folder is no run's, or its run found no program.
+    """
+    file, settings = find_program(folder)
+    world, program = build_world(settings), read_program(file)
+    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+    return write_classroom_page(
+        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
+    )
+
+
+def references(config: Config) -> Sequence[Reference]:
+    """Return the times a run's best is compared with."""
+    bound = load_course(config.course).lower_bound_s(load_robot(config.robot))
+    paper = [Reference("the paper's best", PAPER_BEST_S)] if config.course == "paper" else []
+    return [*paper, Reference("lower bound", bound)]
+
+
+def compare(output: Output, folders: Sequence[Path], out: Path) -> tuple[dict[str, Any], list[Path]]:
+    """Draw runs beside each other, and print what each kind of run came to.
+
+    Returns
+    -------
+    tuple
+        (figures of each group, pictures drawn).
+
+    Raises
+    ------
+    InputError
+        If a folder is no finished run's.
+    """
+    configs = [read_run_config(folder) for folder in folders]
+    results, names = [read_result(folder) for folder in folders], group_names(configs)
+    histories = [read_history(folder) for folder in folders]
+    groups = {
+        name: [h for n, h in zip(names, histories, strict=True) if n == name] for name in dict.fromkeys(names)
+    }
+    table = summaries(names, results)
+    output.print(summary_table(table))
+    same_course = len({(config.course, config.robot) for config in configs}) == 1
+    title = f"{len(folders)} runs" + (f" on {configs[0].course}" if same_course else "")
+    out.mkdir(parents=True, exist_ok=True)
+    figure = compare_runs(
+        groups, references(configs[0]) if same_course else (), title, "median and middle half of runs"
+    )
+    return table, [save(figure, out / "compare.png")]

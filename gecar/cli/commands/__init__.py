@@ -1,0 +1,1 @@
+"""Commands: their options and help; one module each, which imports nothing slow."""

@@ -1,0 +1,78 @@
+"""``gecar calibrate``: fit the robot's own constants to recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gecar.cli.output import JsonOption, Output, plain
+
+
+def calibrate(
+    case: Annotated[
+        Path, typer.Argument(metavar="CASE", show_default=False, help="A folder of recordings of one robot.")
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where robot.toml, calibration.json and the picture go.")
+    ] = Path("calibrated"),
+    holdout: Annotated[
+        str, typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
+                          help="Recordings to judge on, with commas between; nothing is fitted on them."),
+    ] = "",
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="NAME|FILE", show_default="what the recordings name",
+                          help="Where to start."),
+    ] = "",
+    constants: Annotated[
+        str, typer.Option("--constants", metavar="NAMES", show_default="the usual ones",
+                          help="Which to fit, as a robot file names them: battery.voltage,motor.inertia."),
+    ] = "",
+    picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw calibration.png.")] = True,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Fit the robot's own constants, with 95 % intervals, and say which the recordings do not tell.
+
+    What it writes is a robot file that every command takes.
+
+    [bold]Examples[/]
+
+      gecar calibrate recordings/monday --out calibrated
+      gecar calibrate recordings/bench --holdout step_040,step_080 --json
+      gecar evolve --robot calibrated/robot.toml
+    """
+    import json
+
+    from gecar.files import write_whole
+    from gecar.reality.calibrate.calibration import calibrate as calibrate_case
+    from gecar.reality.recordings.recording import read_case
+    from gecar.report.calibration import calibration_lines, calibration_table
+    from gecar.world.robot import load_robot, write_robot
+
+    output = Output(as_json)
+    result = calibrate_case(
+        read_case(case),
+        _names(holdout),
+        load_robot(robot) if robot else None,
+        _names(constants),
+        lambda line: output.print(f"  {line}", style="dim"),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    table = calibration_table(result)
+    written = {"robot": str(out / "robot.toml"), "table": str(out / "calibration.json")}
+    write_whole(out / "calibration.json", json.dumps(plain(table), indent=1, allow_nan=False) + "\n")
+    write_robot(result.robot, out / "robot.toml")
+    if picture:
+        from gecar.plots.reality.calibration import calibration_figure
+        from gecar.plots.style import save
+
+        written["picture"] = str(save(calibration_figure(result), out / "calibration.png"))
+    for line in calibration_lines(result):
+        output.print(line)
+    output.print(f"Robot: {written['robot']}")
+    output.print_json({**table, "written": written})
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]

@@ -1,0 +1,48 @@
+"""``gecar check``: a table of fitness figures against a fresh run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gecar.cli.output import JsonOption, Output
+
+
+def check(
+    table: Annotated[
+        Path, typer.Argument(metavar="TABLE.toml", help="The fitness table; rows without figures are new.")
+    ] = Path("benchmarks/fitness_table.toml"),
+    update: Annotated[bool, typer.Option("--update", help="Write the fresh figures, and say what changed.")] = False,
+    pins: Annotated[
+        bool, typer.Option("--pins", help="Only print the versions the table was made with, for pip install -r.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes; the figures are the same for any number.",
+                                 show_default="cores"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Run a table of fitness figures again: prints what moved and by how much, and exits 1 if anything did.
+
+    With the versions the table names, figures must be equal, on any machine. With others, drives may move by 1 %, a
+    search's median over its seeds by 15 %, and one of its seeds may gain or lose GOAL.
+
+    [bold]Examples[/]
+
+      gecar check
+      gecar check --update
+      gecar check my_study.toml                         a table of your own; gecar's own shows the form
+      gecar check --pins > pins.txt && pip install -r pins.txt
+    """
+    from gecar.parallel.executors import prepare_workers
+
+    if workers != 1 and not pins:
+        prepare_workers()
+    from gecar.cli.actions.check import guard, print_pins
+
+    if pins:
+        print_pins(table)
+    else:
+        guard(Output(as_json), table, update, workers)

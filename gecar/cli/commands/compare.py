@@ -1,0 +1,128 @@
+"""``gecar compare``: simulation beside recordings, as the paper's Tables 6 and 7, Figs 9 and 10."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gecar.cli.options import CourseOption, RobotOption
+from gecar.cli.output import JsonOption, Output, plain
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.language.program import Program
+    from gecar.reality.compare.gap import Gap
+    from gecar.reality.recordings.recording import Recording
+
+FRAMES = ("start", "course")
+
+
+def compare(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(metavar="RECORDING", show_default=False,
+                       help="Recordings (.csv) of one program, or folders of them."),
+    ],
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", metavar="FILE", show_default="what the recordings name",
+                     help="What drove: a program, or a run's folder. Without any, the recorded commands are replayed."),
+    ] = None,
+    course: CourseOption = None,
+    robot: RobotOption = None,
+    frame: Annotated[
+        str,
+        typer.Option("--frame", metavar="start|course",
+                     help="Compare positions from a common start, as the paper does, or in the course's frame."),
+    ] = "start",
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where compare.png, .md, .csv and .json go.")
+    ] = Path("compared"),
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Set simulation beside recordings: arrival times, paths, displacement, correlation, misfit of each channel.
+
+    [bold]Examples[/]
+
+      gecar compare trials/ --program runs/evolve-001
+      gecar compare trial_1.csv trial_2.csv --program best.txt --robot calibrated/robot.toml
+    """
+    from gecar.reality.compare.gap import gap
+    from gecar.report.gap import gap_lines, gap_table
+    from gecar.world.course.course import load_course
+    from gecar.world.robot import load_robot
+
+    if frame not in FRAMES:
+        raise expected("--frame", repr(frame), " or ".join(FRAMES))
+    output = Output(as_json)
+    trials = _read(recordings)
+    driven = _program(program, trials)
+    place = course or trials[0].setup.course
+    if driven is not None and place == "none":
+        raise expected("--course", "none, a blank floor", "the course the program drove on")
+    where = None if place == "none" else load_course(place)
+    found = gap(trials, load_robot(robot or trials[0].setup.robot), where, driven, frame == "course")
+    for line in gap_lines(found):
+        output.print(line)
+    written = _write(found, out, not no_picture)
+    output.print(f"Written: {', '.join(written.values())}")
+    output.print_json({**gap_table(found), "written": written})
+
+
+def _read(places: list[Path]) -> list[Recording]:
+    """Read recordings, and folders of them; they must have a motion on the floor to compare."""
+    from gecar.reality.recordings.recording import read_case, read_recording
+
+    found: list[Recording] = []
+    for place in places:
+        found += read_case(place).recordings if place.is_dir() else (read_recording(place),)
+    for recording in found:
+        if recording.setup.rig != "floor":
+            raise expected(recording.name, "a recording from a bench", "one of a robot on the floor")
+        if not {"x_m", "y_m"} <= set(recording.measured) and not {"left_angle_rad", "right_angle_rad"} <= set(
+            recording.measured
+        ):
+            raise expected(
+                recording.name, "neither a pose nor both wheels' angles", "one of them, for the path"
+            )
+    return found
+
+
+def _program(place: Path | None, trials: list[Recording]) -> Program | None:
+    """Return the program asked for, or the one that all recordings name, or None."""
+    from gecar.cli.inputs import find_program
+    from gecar.language.program import parse_program, read_program
+
+    if place is not None:
+        return read_program(find_program(place)[0])
+    named = {trial.setup.program for trial in trials}
+    if len(named) > 1:
+        raise expected("the recordings", "different programs", "recordings of one program, or --program")
+    text = named.pop()
+    return parse_program(text, f"{trials[0].name}, program") if text else None
+
+
+def _write(found: Gap, out: Path, picture: bool) -> dict[str, str]:
+    """Write the tables and the picture; return where."""
+    import json
+
+    from gecar.files import write_whole
+    from gecar.report.gap import gap_csv, gap_markdown, gap_table
+
+    out.mkdir(parents=True, exist_ok=True)
+    table = json.dumps(plain(gap_table(found)), indent=1, allow_nan=False) + "\n"
+    for ending, text in (("md", gap_markdown(found)), ("csv", gap_csv(found)), ("json", table)):
+        write_whole(out / f"compare.{ending}", text)
+    written = {kind: str(out / f"compare.{kind}") for kind in ("md", "csv", "json")}
+    if picture:
+        from gecar.plots.reality.gap import gap_figure
+        from gecar.plots.style import save
+        from gecar.report.gap import gap_detail, gap_title
+
+        written["png"] = str(
+            save(gap_figure(found, gap_title(found), gap_detail(found)), out / "compare.png")
+        )
+    return written

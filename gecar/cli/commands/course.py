@@ -1,0 +1,192 @@
+"""``gecar course``: list, show, print and make courses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.world.course.course import Course
+    from gecar.world.robot import Robot
+
+course = typer.Typer(
+    name="course",
+    help="List, show, print and make courses.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    add_completion=False,
+)
+
+NameArgument = Annotated[
+    str, typer.Argument(metavar="COURSE", help="A name or a course file (.toml).", show_default=False)
+]
+RobotOption = Annotated[
+    str, typer.Option("--robot", metavar="NAME|FILE", help="For whom the lower bound holds.")
+]
+
+
+@course.command("list")
+def list_all(robot: RobotOption = "ev3", as_json: JsonOption = False) -> None:
+    """List the courses that ship with gecar."""
+    from rich.table import Table
+
+    from gecar.world.course.course import list_courses, load_course
+    from gecar.world.robot import load_robot
+
+    output = Output(as_json)
+    driver = load_robot(robot)
+    table = Table("course", "tiles", "line", "checkpoints", "lower bound", "", box=None, pad_edge=False)
+    found = {name: facts(load_course(name), driver) for name in list_courses()}
+    for name, each in found.items():
+        size = f"{each['columns']} x {each['rows']}"
+        table.add_row(
+            name,
+            size,
+            f"{each['line_m']:.1f} m",
+            str(each["checkpoints"]),
+            f"{each['lower_bound_s']:.2f} s",
+            each["title"],
+        )
+    output.print(table)
+    output.print_json({"courses": found})
+
+
+@course.command()
+def show(
+    name: NameArgument,
+    robot: RobotOption = "ev3",
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw it: .png, .pdf or .svg.", show_default=False),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a course's tiles and what no program can beat on it; draw it if asked.
+
+    [bold]Example[/]
+
+      gecar course show hairpin --picture hairpin.png
+    """
+    from gecar.world.course.course import load_course
+    from gecar.world.robot import load_robot
+
+    output = Output(as_json)
+    loaded, driver = load_course(name), load_robot(robot)
+    if picture is not None:
+        from gecar.plots.courses.course import course_figure
+        from gecar.plots.style import save
+
+        save(course_figure(loaded, driver), picture)
+    each = facts(loaded, driver)
+    output.print(each["title"], style="bold")
+    output.print(loaded.notes)
+    output.print("\n" + "\n".join(f"  {line}" for line in loaded.layout.lines(drawn=True)) + "\n")
+    output.print(
+        f"{each['width_m']:g} x {each['height_m']:g} m, {each['checkpoints']} checkpoints, "
+        f"line {each['line_m']:.2f} m, shortest way {each['shortest_way_m']:.2f} m; "
+        f"no program is faster than {each['lower_bound_s']:.2f} s"
+        + (
+            f", the fastest drive an optimiser found takes {each['reference_s']:.2f} s."
+            if each["reference_s"]
+            else "."
+        )
+    )
+    if picture is not None:
+        output.print(f"Picture: {picture}")
+    output.print_json(
+        {"course": name, **each, "map": loaded.layout.lines(), "picture": str(picture) if picture else None}
+    )
+
+
+@course.command("print")
+def print_out(
+    name: NameArgument,
+    paper: Annotated[
+        str,
+        typer.Option("--paper", metavar="A4|A3|sheet", help="Paper; sheet: the whole course on one page."),
+    ] = "A4",
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Where to.", show_default="COURSE-PAPER.pdf")
+    ] = None,
+    no_guides: Annotated[bool, typer.Option("--no-guides", help="Leave out tiles, START and GOAL.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a PDF of a course at true scale, as one sheet or tiled with cut and joint marks.
+
+    Print it at 100 % (not "fit to page"), and check the 100 mm ruler on each sheet.
+
+    [bold]Examples[/]
+
+      gecar course print paper
+      gecar course print hairpin --paper A3 --out hairpin.pdf
+    """
+    from gecar.plots.courses.course_print import print_course
+    from gecar.plots.courses.sheets import PAPERS
+    from gecar.world.course.course import load_course
+
+    output = Output(as_json)
+    known = {each.lower(): each for each in PAPERS}
+    if paper.lower() not in known:
+        raise expected("--paper", f"'{paper}'", " or ".join(PAPERS))
+    loaded = load_course(name)
+    target = out or Path(f"{loaded.name}-{known[paper.lower()]}.pdf")
+    if target.suffix.lower() != ".pdf":
+        raise expected("--out", f"'{target}'", "a name that ends in .pdf")
+    plan = print_course(loaded, target, known[paper.lower()], guides=not no_guides)
+    sheets = "1 sheet" if len(plan.sheets) == 1 else f"{len(plan.sheets)} sheets and an overview"
+    output.print(f"{target}: {sheets}. Print at 100 %, and check the ruler.")
+    output.print_json({"course": name, "file": str(target), "sheets": len(plan.sheets), "page_mm": plan.page})
+
+
+@course.command()
+def new(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.toml.", show_default=False)
+    ],
+    size: Annotated[str, typer.Option("--size", metavar="COLUMNSxROWS", help="How many tiles.")] = "8x4",
+    tile: Annotated[float, typer.Option("--tile", metavar="M", help="Edge of a tile, in metres.")] = 0.30,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a course file to begin with: a loop with every field explained, to be edited by hand.
+
+    [bold]Example[/]
+
+      gecar course new mine.toml --size 6x4
+    """
+    from gecar.calling import command
+    from gecar.world.course.new_course import new_course
+
+    output = Output(as_json)
+    columns, _, rows = size.lower().partition("x")
+    if not (columns.isdecimal() and rows.isdecimal()):
+        raise expected("--size", f"'{size}'", "tiles across x tiles up, as 8x4")
+    new_course(file, int(columns), int(rows), tile)
+    output.print(
+        f"Wrote {file}. Edit its map, then: {command()} course show {file} --picture {file.stem}.png"
+    )
+    output.print_json({"file": str(file)})
+
+
+def facts(loaded: Course, robot: Robot) -> dict[str, Any]:
+    """Return a course's figures, ready for JSON."""
+    from gecar.world.course.reference_times import reference_s
+
+    return {
+        "title": loaded.title or loaded.name,
+        "columns": loaded.columns,
+        "rows": loaded.rows,
+        "width_m": round(loaded.width_m, 6),
+        "height_m": round(loaded.height_m, 6),
+        "line_m": loaded.length_m,
+        "checkpoints": len(loaded.checkpoints),
+        "shortest_way_m": loaded.shortest.length_m,
+        "lower_bound_s": loaded.lower_bound_s(robot),
+        "reference_s": reference_s(loaded, robot),
+        "walls": len(loaded.walls),
+        "obstacles": len(loaded.obstacles),
+    }

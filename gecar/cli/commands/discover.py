@@ -1,0 +1,106 @@
+"""``gecar discover``: the verdict on what a simulation lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+
+def discover(
+    cases: Annotated[
+        list[Path],
+        typer.Argument(metavar="CASE...", show_default=False, help="Folders, each of recordings of one robot."),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="FOLDER",
+                     help="Where verdict and pictures go; of several cases, a folder in it for each."),
+    ] = Path("verdict"),
+    holdout: Annotated[
+        str,
+        typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
+                     help="Recordings to set aside for the proof, with commas between."),
+    ] = "",
+    robot: Annotated[
+        str,
+        typer.Option("--robot", metavar="NAME|FILE", help="The robot as it is known.",
+                     show_default="what the recordings name"),
+    ] = "",
+    seed: Annotated[int, typer.Option("--seed", help="Of every draw of chance.")] = 0,
+    workers: Annotated[
+        int, typer.Option("--workers", help="Threads, or with --executor processes; 0: all cores.")
+    ] = 0,
+    executor: Annotated[
+        str,
+        typer.Option("--executor", metavar="serial|process|dask", help="Where whole cases are looked at.",
+                     show_default="serial: in this process, one after the other"),
+    ] = "",
+    scheduler: Annotated[
+        str,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+                     show_default=False),
+    ] = "",
+    with_formula: Annotated[
+        bool,
+        typer.Option("--with-formula", show_default=False,
+                     help="Add a formula for what nothing explains to the replays, and show what it gains."),
+    ] = False,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Find which physics the simulation left out, fit it, and prove it on recordings set aside.
+
+    [bold]Examples[/]
+
+      gecar discover recordings/monday --out verdicts/monday
+      gecar discover recordings/monday --holdout run_07,run_08 --json
+      gecar discover recordings/* --out verdicts --executor process
+      gecar evolve --robot verdicts/monday/robot.toml
+    """
+    from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller
+    from gecar.parallel.executors import usable_cores
+    from gecar.reality.recordings.recording import read_case
+    from gecar.world.robot import load_robot
+
+    if workers < 0:
+        raise expected("--workers", workers, "a number of 0 or more")
+    kind = executor or ("dask" if scheduler else "serial")
+    if kind not in ("serial", "process", "dask"):
+        raise expected("--executor", repr(kind), "serial, process or dask")
+    output, names = Output(as_json), [name.strip() for name in holdout.split(",") if name.strip()]
+    known, threads = load_robot(robot) if robot else None, (workers or None) if kind == "serial" else 1
+    tasks = {
+        folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures)
+        for folder, case in folders(out, cases).items()
+    }
+    if kind != "serial" or len(tasks) > 1:
+        conclude_all(output, tasks, kind, workers or usable_cores(), scheduler)
+        return
+    told = conclude(tasks[out], out, teller(output))
+    say(output, told, out)
+    output.print_json(told.table)
+
+
+def folders(out: Path, cases: Sequence[Path]) -> dict[Path, Path]:
+    """Return which folder each case goes to: a single one to the given folder itself.
+
+    Raises
+    ------
+    InputError
+        If two cases would go to the same.
+    """
+    if len(cases) == 1:
+        return {out: cases[0]}
+    found: dict[Path, Path] = {}
+    for case in cases:
+        folder = out / case.resolve().name
+        if folder in found:
+            raise expected("CASE", f"{found[folder]} and {case}", f"different names, for both go to {folder}")
+        found[folder] = case
+    return found

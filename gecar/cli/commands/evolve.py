@@ -1,0 +1,157 @@
+"""``gecar evolve``: evolve a program that brings the robot round a course."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gecar.cli.options import (
+    CourseOption,
+    EngineOption,
+    MotorNoiseOption,
+    NoiseOption,
+    RobotOption,
+    TimeLimitOption,
+)
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+SEARCH, RUN = "Search (default: the preset's)", "Run"
+
+
+def _search(name: str, words: str, default: str | bool = False, metavar: str | None = None) -> Any:
+    """Return an option of the search."""
+    return typer.Option(name, help=words, show_default=default, metavar=metavar, rich_help_panel=SEARCH)
+
+
+def evolve(
+    config: Annotated[
+        Path | None,
+        typer.Argument(metavar="CONFIG.toml", show_default=False,
+                       help="Settings, as in the config.toml of a run's folder; options override them."),
+    ] = None,
+    preset: Annotated[
+        str | None, _search("--preset", "Search settings: better, paper (Table 4) or random.", "better", "NAME")
+    ] = None,
+    population: Annotated[int | None, _search("--population", "Programs in a generation; paper: 200.")] = None,
+    generations: Annotated[int | None, _search("--generations", "How often they are bred anew; paper: 50.")] = None,
+    codons: Annotated[int | None, _search("--codons", "Codons in a genome, the gene length; paper: 1000.")] = None,
+    elites: Annotated[int | None, _search("--elites", "Best ones that stay as they are; paper: 1.")] = None,
+    tournament: Annotated[int | None, _search("--tournament", "Candidates of a selection; paper: 5.")] = None,
+    crossover_rate: Annotated[
+        float | None, _search("--crossover-rate", "Share of pairs that are crossed; paper: 0.4, 0.5, 0.7.")
+    ] = None,
+    mutation_rate: Annotated[
+        float | None, _search("--mutation-rate", "Share of codons drawn anew; paper: 0.03, 0.05, 0.07.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        _search("--set", "Any other search setting, as in config.toml: --set crossover=subtree.", metavar="NAME=VALUE"),
+    ] = None,
+    grammar: Annotated[
+        str | None, _search("--grammar", "What programs are made of.", "paper", "NAME|FILE")
+    ] = None,
+    wraps: Annotated[int | None, _search("--wraps", "How often reading a genome starts again.", "0")] = None,
+    course: CourseOption = None,
+    robot: RobotOption = None,
+    noise: NoiseOption = None,
+    motor_noise: MotorNoiseOption = None,
+    draws: Annotated[
+        int | None,
+        _search("--draws", "Drives a program is judged by, under conditions drawn afresh; 1: the nominal drive alone.",
+                "16; paper: 1", "K"),
+    ] = None,
+    share: Annotated[
+        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.97")
+    ] = None,
+    time_limit: TimeLimitOption = None,
+    engine: EngineOption = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", help="Where all randomness comes from.", show_default="1", rich_help_panel=RUN),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", help="Processes; the result is the same for any number.", show_default="cores",
+                     rich_help_panel=RUN),
+    ] = None,
+    executor: Annotated[
+        str | None,
+        typer.Option("--executor", metavar="process|thread|serial|dask", help="Where programs are simulated.",
+                     show_default="process", rich_help_panel=RUN),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+                     show_default=False, rich_help_panel=RUN),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="A new folder for the results.",
+                     show_default="runs/COURSE-PRESET-seedN", rich_help_panel=RUN),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in --out where it was stopped.", rich_help_panel=RUN)
+    ] = False,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.", rich_help_panel=RUN)] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.", rich_help_panel=RUN)] = False,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Evolve a program that brings the robot round a course.
+
+    [bold]Examples[/]
+
+      gecar evolve
+      gecar evolve --course hairpin --seed 7 --out runs/hairpin-7
+      gecar evolve --preset paper --crossover-rate 0.7 --mutation-rate 0.03
+      gecar evolve runs/hairpin-7/config.toml --seed 8
+      gecar evolve --resume --out runs/hairpin-7
+    """
+    from gecar.parallel.executors import prepare_workers
+
+    if workers != 1 and executor in (None, "process"):
+        prepare_workers()  # they load beside this process
+    output = Output(as_json)
+    search = {
+        "population": population, "generations": generations, "codons": codons, "elites": elites,
+        "tournament": tournament, "crossover_rate": crossover_rate, "mutation_rate": mutation_rate,
+        "draws": draws, "arrival_share": share,
+    }  # fmt: skip
+    options = {
+        "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
+        "time_limit_s": time_limit, "engine": engine, "noise": noise, "motor_noise": motor_noise, "wraps": wraps,
+        "executor": executor or ("dask" if scheduler else None), "scheduler": scheduler,
+    }  # fmt: skip
+    changes = given(options) | {"search": given(search) | settings(setting or [])}
+    from gecar.cli.actions.evolve import begin, run_to_the_end
+
+    run_to_the_end(output, begin(config, changes, out, resume), pictures=not no_pictures, quiet=quiet)
+
+
+def given(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that were typed."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def settings(words: list[str]) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` words; values are as in TOML, and words without quotes text.
+
+    Raises
+    ------
+    InputError
+        If there is no ``=``.
+    """
+    import tomllib
+
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise expected("--set", f"'{word}'", "NAME=VALUE")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[name] = value
+    return found

@@ -1,0 +1,86 @@
+"""``gecar export``: write a program as main.py for the brick."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gecar.cli.options import RobotOption
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+PORTS = "Where things are plugged in"
+
+
+def _port(name: str, words: str) -> typer.models.OptionInfo:
+    return typer.Option(f"--{name}", metavar="PORT", help=words, rich_help_panel=PORTS)
+
+
+def export(
+    program: Annotated[
+        Path,
+        typer.Argument(metavar="PROGRAM", show_default=False,
+                       help="A program file in the paper's syntax, or the folder of a run."),
+    ],
+    target: Annotated[
+        str,
+        typer.Option("--target", metavar="pybricks2|pybricks4",
+                     help="What runs on the brick: EV3 MicroPython 2.0, or Pybricks 4."),
+    ] = "pybricks2",
+    robot: RobotOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Where the files go.", show_default="brick"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that are there.")] = False,
+    left_motor: Annotated[str, _port("left-motor", "A to D; -B if it is mounted the other way round.")] = "B",
+    right_motor: Annotated[str, _port("right-motor", "A to D, likewise.")] = "C",
+    sensor: Annotated[str, _port("sensor", "1 to 4: SensorValue.")] = "3",
+    left_sensor: Annotated[str, _port("left-sensor", "1 to 4: LeftSensorValue.")] = "2",
+    right_sensor: Annotated[str, _port("right-sensor", "1 to 4: RightSensorValue.")] = "4",
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Write a program as main.py for the brick.
+
+    The program stands in it as Python to read and change. On the brick it asks for the sensor's calibration,
+    starts on a button, keeps to its times, stops after 60 s or on a button, and logs the run for gecar import.
+
+    [bold]Examples[/]
+
+      gecar export runs/evolve-001
+      gecar export best.txt --target pybricks4 --out brick4
+      gecar export best.txt --robot my_robot.toml --left-motor -A --right-motor -D --sensor 1
+    """
+    from gecar.brick.export import Ports, export_program
+    from gecar.cli.inputs import find_program
+    from gecar.language.program import read_program
+    from gecar.world.robot import load_robot
+
+    output = Output(as_json)
+    file, settings = find_program(program)
+    loaded = read_program(file)
+    plugs = Ports(left_motor.upper(), right_motor.upper(), sensor, left_sensor, right_sensor)
+    driver = load_robot(settings.get("robot", "ev3") if robot is None else robot)
+    folder = out or Path("brick")
+    written = _write(export_program(loaded, driver, target, plugs), folder, force)
+    output.print(loaded.source)
+    output.print(f"Written: {', '.join(written)}")
+    output.print(
+        f"Copy the folder {folder} to the brick." if target == "pybricks2" else "Open it in Pybricks Code."
+    )
+    output.print_json({"program": loaded.source, "target": target, "files": written})
+
+
+def _write(files: dict[str, str], folder: Path, force: bool) -> list[str]:
+    """Write files into a folder, and return their paths."""
+    from gecar.files import write_whole
+
+    for name in files:
+        if (folder / name).exists() and not force:
+            raise expected(folder / name, "a file that is there", "none, or --force to write over it")
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        write_whole(folder / name, text)
+    return [str(folder / name) for name in files]

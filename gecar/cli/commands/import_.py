@@ -1,0 +1,263 @@
+"""``gecar import``: make a recording from the logs people have on disk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.reality.recordings.importing.frame import Frame
+    from gecar.reality.recordings.importing.logs import Imported
+    from gecar.reality.recordings.setup import Setup
+
+FILES, CAMERA, RUN = "What the files hold", "The camera", "What the recording is of"
+
+
+def import_(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG", show_default=False,
+                       help="The brick's log; and the camera's of the same run, if there is one, in any order."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="The recording (.csv; a .toml goes beside it).",
+                     show_default="recordings/LOG.csv"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over a recording that is there.")] = False,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="NAME=COLUMN[:UNIT]", rich_help_panel=FILES, show_default=False,
+                     help="What a column is, where the guess is wrong: lm=left_angle_deg:rad; speed=- passes it over."),
+    ] = None,
+    constant: Annotated[
+        list[str] | None,
+        typer.Option("--constant", metavar="COLUMN=VALUE", rich_help_panel=FILES, show_default=False,
+                     help="A column that was constant and not logged: left_duty_pct=60."),
+    ] = None,
+    names: Annotated[
+        str | None,
+        typer.Option("--names", metavar="A,B,...", rich_help_panel=FILES, show_default=False,
+                     help="The columns' names, for a file that has none."),
+    ] = None,
+    run: Annotated[
+        int | None,
+        typer.Option("--run", metavar="N", rich_help_panel=FILES, help="Which run, where a file holds several.",
+                     show_default="the longest"),
+    ] = None,
+    offset: Annotated[
+        float | None,
+        typer.Option("--offset", metavar="S", rich_help_panel=CAMERA, show_default="found from motion",
+                     help="What to add to the camera's times, in seconds."),
+    ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option("--scale", metavar="M", rich_help_panel=CAMERA, show_default="by name, size and encoders",
+                     help="Length of the camera's unit, in metres."),
+    ] = None,
+    origin: Annotated[
+        str, typer.Option("--origin", metavar="X,Y", rich_help_panel=CAMERA,
+                          help="The course's lower left corner as the camera has it, in its unit."),
+    ] = "0,0",
+    turn: Annotated[
+        float, typer.Option("--turn", metavar="DEG", rich_help_panel=CAMERA,
+                            help="How far the camera's x axis is turned counter-clockwise from the course's."),
+    ] = 0.0,
+    y_down: Annotated[
+        bool | None,
+        typer.Option("--y-down/--y-up", rich_help_panel=CAMERA, show_default="by the encoders",
+                     help="Which way the camera's y axis points."),
+    ] = None,
+    clockwise: Annotated[
+        bool | None,
+        typer.Option("--clockwise/--counter-clockwise", rich_help_panel=CAMERA, show_default="by the encoders",
+                     help="Which way the camera's headings count."),
+    ] = None,
+    heading_zero: Annotated[
+        float | None,
+        typer.Option("--heading-zero", metavar="DEG", rich_help_panel=CAMERA, show_default="from motion",
+                     help="The heading the camera gives a robot that faces along its x axis."),
+    ] = None,
+    mark: Annotated[
+        str, typer.Option("--mark", metavar="AHEAD,LEFT", rich_help_panel=CAMERA,
+                          help="Where the mark is on the robot, from the axle's centre, in metres."),
+    ] = "0,0",
+    place: Annotated[
+        bool, typer.Option("--place", rich_help_panel=CAMERA, help="Move and turn the path to start on START."),
+    ] = False,
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="NAME|FILE", rich_help_panel=RUN, help="Who drove."),
+    ] = "ev3",
+    course: Annotated[
+        str, typer.Option("--course", metavar="NAME|FILE|none", rich_help_panel=RUN, help="Where; none: blank floor."),
+    ] = "paper",
+    bench: Annotated[
+        bool, typer.Option("--bench", rich_help_panel=RUN, help="Wheels in the air, or one motor alone."),
+    ] = False,
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", metavar="FILE", rich_help_panel=RUN, show_default=False,
+                     help="The program that drove."),
+    ] = None,
+    notes: Annotated[str, typer.Option("--notes", rich_help_panel=RUN, help="Anything else.")] = "",
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Make a recording from the logs people have on disk.
+
+    Reads Pybricks DataLogs, text copied from a terminal, Tracker's exports and cameras' tables; guesses columns,
+    units and axes, and says what it guessed; aligns the camera's clock by motion; mends what is safe to mend,
+    with a line each, and refuses the rest with a reason.
+
+    [bold]Examples[/]
+
+      gecar import gecar_log_2026_11_21.csv
+      gecar import terminal.txt tracker.txt --place --program best.txt
+      gecar import log.csv camera.csv --origin 112,940 --mark 0.04,0 --out case/run_1.csv
+      gecar import step.csv --bench --constant left_duty_pct=60
+    """
+    from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
+    from gecar.reality.recordings.importing.meaning import parse_said
+    from gecar.reality.recordings.recording import write_recording
+    from gecar.world.robot import load_robot
+
+    output = Output(as_json)
+    target = out or Path("recordings") / f"{logs[0].stem}.csv"
+    if target.suffix != ".csv":
+        raise expected("--out", f"'{target}'", "a name that ends in .csv")
+    if target.exists() and not force:
+        raise expected(target, "a file that is there", "none, or --force to write over it")
+    options = ImportOptions(
+        said=parse_said(column or ()),
+        names=tuple(name.strip() for name in names.split(",")) if names else (),
+        run=run,
+        constant=_constants(constant or ()),
+        frame=_frame(
+            scale,
+            y_down,
+            clockwise,
+            _pair("--origin", origin),
+            turn,
+            heading_zero,
+            mark,
+            course if place else None,
+        ),
+        offset_s=_finite("--offset", offset),
+    )
+    imported = import_logs(logs, load_robot(robot), _setup(robot, course, bench, program, notes), options)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_recording(imported.recording, target)
+    _tell(output, imported, target)
+
+
+def _tell(output: Output, imported: Imported, target: Path) -> None:
+    """Say what was guessed, mended and written."""
+    recording, offset = imported.recording, imported.offset
+    for line in imported.guesses:
+        output.print(line)
+    for line in imported.repairs:
+        output.print(line, style="yellow")
+    rows, duration = len(recording.t_s), recording.duration_s
+    output.print(
+        f"Written: {target}, {rows} rows over {duration:.2f} s with {', '.join(recording.measured) or 'commands'}"
+    )
+    output.print_json(
+        {
+            "recording": str(target),
+            "rows": rows,
+            "duration_s": duration,
+            "measured": recording.measured,
+            "guesses": imported.guesses,
+            "repairs": imported.repairs,
+            "clock_offset": vars(offset) if offset else None,
+        }
+    )
+
+
+def _setup(robot: str, course: str, bench: bool, program: Path | None, notes: str) -> Setup:
+    """Return what goes into the recording's TOML; files of one's own become absolute paths."""
+    from gecar.language.program import read_program
+    from gecar.reality.recordings.setup import Setup
+    from gecar.world.course.course import load_course
+
+    if course != "none":
+        load_course(course)
+    text = read_program(program).source if program else None
+    rig = "bench" if bench else "floor"
+    return Setup(robot=_kept(robot), course=_kept(course), rig=rig, program=text, notes=notes)
+
+
+def _kept(name: str) -> str:
+    return str(Path(name).resolve()) if Path(name).is_file() else name
+
+
+def _frame(
+    scale: float | None, y_down: bool | None, clockwise: bool | None, origin: tuple[float, float], turn: float,
+    heading_zero: float | None, mark: str, start_of: str | None,
+) -> Frame:  # fmt: skip
+    """Return the camera's frame; ``start_of`` is the course whose START the path begins at."""
+    from gecar.reality.recordings.importing.frame import Frame
+    from gecar.world.course.course import load_course
+
+    if scale is not None and not 0.0 < scale < math.inf:
+        raise expected("--scale", scale, "a length above 0")
+    start = None
+    if start_of == "none":
+        raise expected("--place", "the course none", "a course with a START")
+    if start_of is not None:
+        pose = load_course(start_of).start
+        start = (pose.x_m, pose.y_m, pose.heading_rad)
+    return Frame(
+        scale=scale,
+        y_down=y_down,
+        heading_clockwise=clockwise,
+        origin=origin if any(origin) else None,
+        turn_deg=_finite("--turn", turn) or 0.0,
+        heading_zero_deg=_finite("--heading-zero", heading_zero),
+        mark=_pair("--mark", mark),
+        start=start,
+    )
+
+
+def _finite(option: str, value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise expected(option, value, "a number")
+    return value
+
+
+def _number(option: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise expected(option, f"'{text}'", "a number")
+    return value
+
+
+def _pair(option: str, text: str) -> tuple[float, float]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise expected(option, f"'{text}'", "two numbers with a comma between")
+    return _number(option, parts[0]), _number(option, parts[1])
+
+
+def _constants(texts: Sequence[str]) -> dict[str, float]:
+    """Read ``COLUMN=VALUE`` options."""
+    from gecar.reality.recordings.columns import COLUMNS
+
+    constants = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in COLUMNS or name == "t_s":
+            raise expected(
+                "--constant", f"'{text}'", f"COLUMN=VALUE with one of {', '.join(list(COLUMNS)[1:])}"
+            )
+        constants[name] = _number("--constant", value)
+    return constants

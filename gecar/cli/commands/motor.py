@@ -1,0 +1,36 @@
+"""``gecar motor``: the motor's speed against speed input and power, the paper's Figs 7 and 8."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gecar.cli.options import RobotOption
+from gecar.cli.output import JsonOption, Output
+
+
+def motor(
+    benches: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FOLDER", show_default=False,
+                       help="Recordings of motors on a bench, a folder for each motor."),
+    ] = None,
+    robot: RobotOption = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="PICTURE", help="Where the picture goes (.png, .pdf, .svg).")
+    ] = Path("motor.png"),
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Draw the motor's speed against speed input and against power: the paper's Figs 7 and 8.
+
+    [bold]Examples[/]
+
+      gecar motor
+      gecar motor recordings/motor_a recordings/motor_b --out figures/motor.png
+      gecar motor --robot my_robot.toml
+    """
+    from gecar.cli.actions.motor import draw_motor
+
+    draw_motor(Output(as_json), benches or [], robot or "ev3", out)

@@ -1,0 +1,200 @@
+"""``gecar simulate``: drive a program, and draw or film the drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gecar.cli.options import (
+    CourseOption,
+    EngineOption,
+    MotorNoiseOption,
+    NoiseOption,
+    RobotOption,
+    TimeLimitOption,
+)
+from gecar.cli.output import JsonOption, Output
+from gecar.errors import expected
+
+if TYPE_CHECKING:
+    from gecar.language.program import Program
+    from gecar.world.rollout import Drive, World
+
+PICTURES = "Pictures"
+LARGEST_SEED = 2**63 - 1
+
+ProgramArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PROGRAM",
+        show_default=False,
+        help="A program file in the paper's syntax, or the folder of a run.",
+    ),
+]
+
+
+def simulate(
+    program: ProgramArgument,
+    course: CourseOption = None,
+    robot: RobotOption = None,
+    noise: NoiseOption = None,
+    motor_noise: MotorNoiseOption = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", help="Which noise.", show_default="as in the run, or 1", rich_help_panel="World"),
+    ] = None,
+    time_limit: TimeLimitOption = None,
+    engine: EngineOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Where trajectory.png goes.", show_default="here",
+                     rich_help_panel=PICTURES),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Name of the picture: .png, .pdf or .svg.",
+                     show_default="trajectory.png", rich_help_panel=PICTURES),
+    ] = None,
+    no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.", rich_help_panel=PICTURES)] = False,
+    colour: Annotated[
+        str,
+        typer.Option("--colour", metavar="auto|line|speed", rich_help_panel=PICTURES,
+                     help="What the way's colour says: the line of the program, or the speed."),
+    ] = "auto",
+    animate: Annotated[
+        Path | None,
+        typer.Option("--animate", metavar="FILE", help="Film the drive: .gif, or .mp4 where ffmpeg is installed.",
+                     show_default=False, rich_help_panel=PICTURES),
+    ] = None,
+    pace: Annotated[
+        float, typer.Option("--pace", help="Seconds of driving in a second of film.", rich_help_panel=PICTURES)
+    ] = 1.0,
+    page: Annotated[
+        Path | None,
+        typer.Option("--html", metavar="FILE", help="Write the drive as a page that plays it, for a classroom.",
+                     show_default=False, rich_help_panel=PICTURES),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option("--record", metavar="FILE", show_default=False, rich_help_panel=PICTURES,
+                     help="Keep the drive as a recording (.csv), to rehearse what is done with a real robot's."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Drive a program in the simulation; draw or film the drive.
+
+    [bold]Examples[/]
+
+      gecar simulate runs/evolve-001
+      gecar simulate best.txt --course hairpin --animate drive.gif
+      gecar simulate best.txt --html drive.html
+      gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
+    """
+    from gecar.cli.inputs import build_world, drive_seed, find_program
+    from gecar.language.program import read_program
+    from gecar.report.drive import arrival_of, drive_table, sentence_of, standing_of
+    from gecar.results.run import arrives
+    from gecar.world.rollout import simulate as run
+
+    output = Output(as_json)
+    if seed is not None and not 0 <= seed <= LARGEST_SEED:
+        raise expected("--seed", seed, f"a whole number from 0 to {LARGEST_SEED}")
+    target = None if no_picture else (out or Path()) / (picture or Path("trajectory.png"))
+    _check_pictures(target, colour, animate, pace)
+    file, settings = find_program(program)
+    world = build_world(settings, course, robot, noise, motor_noise, time_limit, engine)
+    loaded = read_program(file)
+    which = drive_seed(seed, settings, loaded)
+    drive = run(world, loaded.opcodes, which, trace=True)
+    output.print(sentence_of(drive), style="bold")
+    output.print(standing_of(world, drive))
+    arrival = arrives(world, loaded, which)
+    output.print(arrival_of(arrival))
+    written = _draw(output, world, loaded, drive, target, colour)
+    written |= _film(output, world, loaded, drive, animate, pace)
+    written |= _play(output, world, loaded, drive, page)
+    written |= _record(output, world, loaded, drive, record, course)
+    output.print_json(
+        {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
+    )
+
+
+def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:
+    """Refuse before the drive what could not be drawn after it, and make room for the rest."""
+    if target is not None:
+        from gecar.plots.drives.trajectory import check_colour
+        from gecar.plots.style import picture_kind
+
+        picture_kind(target)
+        check_colour(colour)
+        target.parent.mkdir(parents=True, exist_ok=True)
+    if animate is not None:
+        from gecar.plots.drives.animation import check_film
+
+        check_film(animate, pace)
+        animate.parent.mkdir(parents=True, exist_ok=True)
+
+
+def _draw(
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, colour: str
+) -> dict[str, str]:
+    """Draw the drive if a picture is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.drives.trajectory import trajectory
+    from gecar.plots.style import save
+    from gecar.report.drive import detail_of, title_of
+
+    title, detail = title_of(drive, world.course), detail_of(world, drive)
+    save(trajectory(world, program, drive, title=title, detail=detail, colour=colour), target)
+    output.print(f"Picture: {target}")
+    return {"picture": str(target)}
+
+
+def _film(
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, pace: float
+) -> dict[str, str]:
+    """Film the drive if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.drives.animation import film
+    from gecar.report.drive import title_of
+
+    film(world, program, drive, target, title=title_of(drive, world.course), pace=pace)
+    output.print(f"Film: {target}")
+    return {"film": str(target)}
+
+
+def _play(
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None
+) -> dict[str, str]:
+    """Write the drive as a page if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.plots.drives.classroom import write_classroom_page
+    from gecar.report.drive import detail_of, title_of
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_classroom_page(
+        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
+    )
+    output.print(f"Page: {target}")
+    return {"page": str(target)}
+
+
+def _record(
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, course: str | None
+) -> dict[str, str]:
+    """Keep the drive as a recording if that is wanted."""
+    if target is None:
+        return {}
+    from gecar.reality.recordings.recording import write_recording
+    from gecar.reality.recordings.synthetic import rehearsal
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    place = str(Path(course).resolve()) if course and Path(course).is_file() else ""
+    write_recording(rehearsal(world, program, drive, target.stem, place), target)
+    output.print(f"Recording: {target}")
+    return {"recording": str(target)}

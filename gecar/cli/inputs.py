@@ -1,0 +1,84 @@
+"""From options and runs' folders to programs, and robots on courses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gecar.errors import expected
+from gecar.evolution.ask_tell import noise_seed
+from gecar.language.program import Program
+from gecar.results.config import Config, configure, read_config
+from gecar.world.course.course import load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Noise, World
+
+_OF_A_WORLD = ("course", "robot", "time_limit_s", "step_s", "engine", "noise", "motor_noise", "seed")
+
+
+def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
+    """Find a program's file, and the settings of the run it comes from if it lies in a run's folder.
+
+    Raises
+    ------
+    InputError
+        If a folder holds no best.txt, or its config.toml is wrong.
+    """
+    file = place / "best.txt" if place.is_dir() else place
+    if place.is_dir() and not file.is_file():
+        raise expected(place, "a folder without best.txt", "a program file or a run's folder")
+    beside = file.parent / "config.toml"
+    if file.name != "best.txt" or not beside.is_file():
+        return file, {}
+    config = read_run_config(file.parent)
+    return file, {name: getattr(config, name) for name in _OF_A_WORLD}
+
+
+def read_run_config(folder: Path) -> Config:
+    """Read the configuration a run's folder holds.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is wrong.
+    """
+    place = folder / "config.toml"
+    return configure(read_config(place), place)
+
+
+def build_world(
+    settings: dict[str, Any],
+    course: str | None = None,
+    robot: str | None = None,
+    noise_pct: float | None = None,
+    motor_noise_pct: float | None = None,
+    time_limit_s: float | None = None,
+    engine: str | None = None,
+) -> World:
+    """Put a robot on a course; what is None comes from a run's settings, or else is as in the paper.
+
+    Raises
+    ------
+    InputError
+        If there is no such course or robot, or a number is out of range.
+    """
+    plain = Config()
+
+    def chosen(given: Any, name: str) -> Any:
+        return settings.get(name, getattr(plain, name)) if given is None else given
+
+    return World(
+        load_robot(chosen(robot, "robot")),
+        load_course(chosen(course, "course")),
+        chosen(None, "step_s"),
+        chosen(time_limit_s, "time_limit_s"),
+        Noise(chosen(noise_pct, "noise"), 0.01 * chosen(motor_noise_pct, "motor_noise")),
+        chosen(engine, "engine"),
+    )
+
+
+def drive_seed(given: int | None, settings: dict[str, Any], program: Program) -> int:
+    """Return the seed of a drive's noise: as given, or as the run scored the program, or 1."""
+    if given is not None:
+        return given
+    return noise_seed(settings["seed"], program) if settings else 1

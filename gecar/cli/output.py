@@ -1,0 +1,58 @@
+"""A command's output: text for people, or one JSON object for programs with the text moved to stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+JsonOption = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object on stdout; words go to stderr.", show_default=False),
+]
+
+
+class Output:
+    """Where a command prints.
+
+    Parameters
+    ----------
+    as_json
+        Whether stdout is kept for a JSON object.
+    """
+
+    def __init__(self, as_json: bool) -> None:
+        self.as_json = as_json
+        self.console = Console(stderr=as_json, highlight=False)
+        if not self.console.is_terminal:
+            self.console.width = 200  # a file has room for tables
+
+    def print(self, words: object = "", style: str | None = None) -> None:
+        """Print words or a table; long lines are the terminal's to break. Brackets are text, not markup."""
+        if isinstance(words, str):
+            self.console.print(words, style=style, markup=False, soft_wrap=True)
+        else:
+            self.console.print(words)
+
+    def print_json(self, table: Mapping[str, Any]) -> None:
+        """Print a command's JSON object, if that is what is wanted."""
+        if self.as_json:
+            sys.stdout.write(json.dumps(plain(table), indent=2, allow_nan=False) + "\n")
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON knows it: numbers that are none become null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if hasattr(value, "tolist"):  # NumPy's numbers and arrays
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str | None) else str(value)

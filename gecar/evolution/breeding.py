@@ -1,0 +1,192 @@
+"""Breeding: the settings' operators, put together in the order the paper lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
+from gecar.evolution.initialisation import initialise
+from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, differs
+from gecar.evolution.mutation import Creep, Flip, Renew
+from gecar.evolution.phenotypes import Phenotype, Phenotypes
+from gecar.evolution.selection import deviations, lexicase, segment_times, tournament
+from gecar.language.mapping import Mapper
+from gecar.language.opcodes import MAX_DUTY_PCT
+from gecar.random_streams import Streams, spawn
+from gecar.search.fitness import Scores, merit
+from gecar.search.settings import Settings
+
+Bytes = npt.NDArray[np.uint8]
+Int32s = npt.NDArray[np.int32]
+Operator = Callable[[Bytes, Mapper, Streams], Bytes]
+"""Genomes (children, codons), what they derive, and a stream for each; the genomes may be changed in place."""
+
+
+@dataclass(frozen=True)
+class Bred:
+    """Individuals that wait for their scores.
+
+    Attributes
+    ----------
+    genomes
+        Elites first (population, codons).
+    phenotypes
+        Their programs; None where a genome maps to none.
+    parents
+        Indices in the population before (population, 2): whose genome it was, and whom it was paired with; an
+        elite's are twice itself, those of the first population and of ``renew`` are -1.
+    changed
+        Which operators changed what the genome derives (population,), as bits; see `gecar.evolution.lineage`.
+    """
+
+    genomes: Bytes
+    phenotypes: list[Phenotype | None]
+    parents: Int32s
+    changed: Bytes
+
+
+Drawn = tuple[Bytes, Int32s, Bytes]
+"""Genomes, parents and changes, as in `Bred`."""
+
+
+class Breeder:
+    """Breeds populations; what it breeds depends on nothing but its arguments.
+
+    Parameters
+    ----------
+    settings
+        Which operators.
+    mapper
+        What genomes derive.
+    seed
+        The run's.
+    duty_cap_pct
+        As for `gecar.evolution.ask_tell.Evolution`.
+    """
+
+    def __init__(
+        self, settings: Settings, mapper: Mapper, seed: int, duty_cap_pct: int = MAX_DUTY_PCT
+    ) -> None:
+        self.settings, self.mapper, self.seed = settings, mapper, seed
+        self._phenotypes = Phenotypes(mapper, duty_cap_pct)
+        self._operators = _operators(settings)
+
+    def read(self, genomes: Bytes) -> list[Phenotype | None]:
+        """Return what genomes derive."""
+        return self._phenotypes.read(genomes)
+
+    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred:
+        """Return a first population: that of generation 0, or of a later one that begins anew."""
+        settings = self.settings
+
+        def draw(attempt: int) -> Drawn:
+            n = settings.population
+            genomes = initialise(settings, self.mapper, spawn(self.seed, generation, attempt, n))
+            return genomes, np.full((n, 2), -1, np.int32), np.zeros(n, np.uint8)
+
+        return self._without_duplicates(draw, 0, known)
+
+    def next(self, genomes: Bytes, scores: Scores, generation: int, known: Callable[[bytes], bool]) -> Bred:
+        """Return the population bred from one that has its scores.
+
+        Parameters
+        ----------
+        genomes, scores
+            The population before.
+        generation
+            The number of the new one.
+        known
+            Whether a program, by its digest, was simulated before.
+        """
+        n_elites = self.settings.elites
+        merits = merit(scores, self.settings.checkpoint_credit)
+        elites = np.argsort(merits, kind="stable")[:n_elites].astype(np.int32)
+
+        def draw(attempt: int) -> Drawn:
+            n = self.settings.population - n_elites
+            streams = spawn(self.seed, generation, attempt, n + n % 2)
+            chosen = self._select(merits, scores, streams)
+            children, changed = self._vary(genomes[chosen], streams)
+            pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
+            if self.settings.mutation == "renew":
+                pairs[:] = -1
+            return (
+                np.concatenate([genomes[elites], children[:n]]),
+                np.concatenate([np.column_stack([elites, elites]), pairs[:n]]),
+                np.concatenate([np.zeros(n_elites, np.uint8), changed[:n]]),
+            )
+
+        return self._without_duplicates(draw, n_elites, known)
+
+    def _vary(self, children: Bytes, streams: Streams) -> tuple[Bytes, Bytes]:
+        """Return the children as the operators leave them, and which operators changed what they derive."""
+        changed, before = np.zeros(len(children), np.uint8), self.mapper.map(children)
+        for bit, operator in self._operators:
+            children = operator(children, self.mapper, streams)
+            after = self.mapper.map(children)
+            changed += np.uint8(bit) * differs(before, after)
+            before = after
+        return children, changed
+
+    def _select(self, merits: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
+        if self.settings.selection == "tournament":
+            return tournament(merits, self.settings.tournament, streams)
+        cases = segment_times(scores["arrival_s"])
+        return lexicase(cases, deviations(cases), streams)
+
+    def _without_duplicates(
+        self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
+    ) -> Bred:
+        """Draw individuals, and draw those again that are duplicates, as often as the settings say."""
+        self._phenotypes.turn()
+        genomes, parents, changed = draw(0)
+        phenotypes = self._phenotypes.read(genomes)
+        attempts = 0 if self.settings.duplicates == "kept" else self.settings.attempts
+        simulated = known if self.settings.duplicates == "run" else _never
+        for attempt in range(1, attempts + 1):
+            again = _duplicates(phenotypes, n_elites, simulated)
+            if not again:
+                break
+            for kept, drawn in zip((genomes, parents, changed), draw(attempt), strict=True):
+                kept[again] = drawn[again]  # type: ignore[index]
+            for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
+                phenotypes[i] = phenotype
+        return Bred(genomes, phenotypes, parents, changed)
+
+
+def _operators(settings: Settings) -> list[tuple[int, Operator]]:
+    """Return crossover and mutation as the settings have them, each with its bit in a lineage."""
+    if settings.mutation == "renew":
+        return [(MUTATION, Renew(settings))]
+    crossover: dict[str, Operator] = {
+        "one_point": OnePoint(settings.crossover_rate),
+        "one_point_used": OnePoint(settings.crossover_rate, within_used=True),
+        "variable_one_point": VariableOnePoint(settings.crossover_rate),
+        "subtree": Subtree(settings.crossover_rate),
+    }
+    rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
+    flip = Flip(rate, within_used=settings.mutation != "codon")
+    creep: list[tuple[int, Operator]] = [(CREEP, Creep(settings.creep_rate))] if settings.creep_rate else []
+    return [(CROSSOVER, crossover[settings.crossover]), (MUTATION, flip), *creep]
+
+
+def _duplicates(
+    phenotypes: list[Phenotype | None], n_elites: int, simulated: Callable[[bytes], bool]
+) -> list[int]:
+    """Return the individuals, elites apart, that are no program or one seen before."""
+    seen: set[bytes] = set()
+    found = []
+    for i, phenotype in enumerate(phenotypes):
+        if i >= n_elites and (phenotype is None or phenotype.digest in seen or simulated(phenotype.digest)):
+            found.append(i)
+        if phenotype is not None:
+            seen.add(phenotype.digest)
+    return found
+
+
+def _never(digest: bytes) -> bool:  # noqa: ARG001
+    return False

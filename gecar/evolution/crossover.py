@@ -1,0 +1,173 @@
+"""Crossover: genomes side by side, 0 with 1, 2 with 3 and so on, exchange codons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import compiled
+from gecar.language.mapping import Mapped, Mapper
+from gecar.random_streams import Streams, below, uniform
+
+Bools = npt.NDArray[np.bool_]
+Bytes = npt.NDArray[np.uint8]
+Int32s = npt.NDArray[np.int32]
+Int64s = npt.NDArray[np.int64]
+
+
+def used_codons(mapped: Mapped, codons: int) -> Int32s:
+    """Return how many codons of each genome its derivation reads (genomes,)."""
+    return np.minimum(mapped.used, codons)
+
+
+@dataclass(frozen=True)
+class OnePoint:
+    """Genomes exchange what stands behind one point, the same in both.
+
+    Attributes
+    ----------
+    rate
+        Share of pairs that do.
+    within_used
+        Whether the point lies within the codons that both use, or anywhere.
+    """
+
+    rate: float
+    within_used: bool = False
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        codons = genomes.shape[1]
+        reach = np.full(len(genomes), codons, np.int32)
+        if self.within_used:
+            reach = used_codons(mapper.map(genomes), codons)
+        _swap_tails(genomes, reach, self.rate, streams)
+        return genomes
+
+
+@compiled
+def _swap_tails(genomes: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+    for i in range(0, genomes.shape[0] - 1, 2):
+        shared = min(reach[i], reach[i + 1])
+        if uniform(streams[i]) < rate and shared > 1:
+            for k in range(1 + below(streams[i], shared - 1), genomes.shape[1]):
+                genomes[i, k], genomes[i + 1, k] = genomes[i + 1, k], genomes[i, k]
+
+
+@dataclass(frozen=True)
+class VariableOnePoint:
+    """Genomes exchange what stands behind a point of its own in either, within what it uses (PonyGE2's default).
+
+    What grows beyond the genome is cut, what is missing at its end stays as it was.
+
+    Attributes
+    ----------
+    rate
+        Share of pairs that do.
+    """
+
+    rate: float
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        children = genomes.copy()
+        _swap_any_tails(
+            genomes, children, used_codons(mapper.map(genomes), genomes.shape[1]), self.rate, streams
+        )
+        return children
+
+
+@compiled
+def _swap_any_tails(genomes: Bytes, children: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+    codons = genomes.shape[1]
+    for i in range(0, genomes.shape[0] - 1, 2):
+        if uniform(streams[i]) < rate and reach[i] > 0 and reach[i + 1] > 0:
+            a, b = 1 + below(streams[i], reach[i]), 1 + below(streams[i], reach[i + 1])
+            _splice(children[i], genomes[i], a, codons, genomes[i + 1], b, min(codons, b + codons - a))
+            _splice(children[i + 1], genomes[i + 1], b, codons, genomes[i], a, min(codons, a + codons - b))
+
+
+@dataclass(frozen=True)
+class Subtree:
+    """Genomes exchange the codons of two subtrees with the same nonterminal (Harper and Blair 2005, LHS crossover).
+
+    Attributes
+    ----------
+    rate
+        Share of pairs that do, where both are valid and the children fit into their genomes.
+    """
+
+    rate: float
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        mapped = mapper.map(genomes)
+        children = genomes.copy()
+        whole = mapped.valid & (mapped.used <= genomes.shape[1])
+        _swap_subtrees(
+            genomes, children, whole, mapped.offsets, mapped.symbols, mapped.subtree_ends, self.rate, streams
+        )
+        return children
+
+
+@compiled
+def _swap_subtrees(
+    genomes: Bytes,
+    children: Bytes,
+    whole: Bools,
+    offsets: Int64s,
+    symbols: Int32s,
+    ends: Int32s,
+    rate: float,
+    streams: Streams,
+) -> None:
+    codons = genomes.shape[1]
+    for i in range(0, genomes.shape[0] - 1, 2):
+        if uniform(streams[i]) >= rate or not whole[i] or not whole[i + 1] or offsets[i] == offsets[i + 1]:
+            continue
+        first, second = offsets[i], offsets[i + 1]
+        a = first + below(streams[i], second - first)
+        b = _draw_alike(symbols, second, offsets[i + 2], symbols[a], streams, i)
+        if b < 0:
+            continue
+        begin_a, end_a, begin_b, end_b = a - first, ends[a], b - second, ends[b]
+        growth = (end_b - begin_b) - (end_a - begin_a)
+        if second - first + growth <= codons and offsets[i + 2] - second - growth <= codons:
+            _splice(children[i], genomes[i], begin_a, end_a, genomes[i + 1], begin_b, end_b)
+            _splice(children[i + 1], genomes[i + 1], begin_b, end_b, genomes[i], begin_a, end_a)
+
+
+@compiled
+def _draw_alike(symbols: Int32s, first: int, last: int, symbol: int, streams: Streams, i: int) -> int:
+    """Draw one of the places from first up to last that hold the symbol; -1 if none does."""
+    alike = 0
+    for k in range(first, last):
+        alike += symbols[k] == symbol
+    if alike == 0:
+        return -1
+    skip = below(streams[i], alike)
+    for k in range(first, last):
+        if symbols[k] == symbol:
+            if skip == 0:
+                return k
+            skip -= 1
+    return -1
+
+
+@compiled
+def _splice(child: Bytes, own: Bytes, begin: int, end: int, donor: Bytes, first: int, last: int) -> None:
+    """Write own codons with ``begin`` up to ``end`` replaced by the donor's ``first`` up to ``last``.
+
+    The codons behind move along; what is missing at the genome's end stays as it was.
+    """
+    at = begin
+    for k in range(first, last):
+        child[at] = donor[k]
+        at += 1
+    for k in range(end, own.size):
+        if at == own.size:
+            break
+        child[at] = own[k]
+        at += 1

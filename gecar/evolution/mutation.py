@@ -1,0 +1,148 @@
+"""Mutation: codons drawn anew, numbers moved to a neighbour, whole individuals renewed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import compiled
+from gecar.evolution.crossover import used_codons
+from gecar.evolution.initialisation import initialise
+from gecar.language.grammar import Grammar, Rule
+from gecar.language.mapping import Mapper
+from gecar.random_streams import Streams, below, uniform
+from gecar.search.settings import Settings
+
+Bools = npt.NDArray[np.bool_]
+Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float64]
+Int32s = npt.NDArray[np.int32]
+Int64s = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Flip:
+    """Codons are drawn anew from 0..255.
+
+    Attributes
+    ----------
+    rate
+        Probability of each; None for one codon on average.
+    within_used
+        Whether only codons that the derivation reads.
+    """
+
+    rate: float | None
+    within_used: bool = False
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        codons = genomes.shape[1]
+        reach = np.full(len(genomes), codons, np.int32)
+        if self.within_used:
+            reach = used_codons(mapper.map(genomes), codons)
+        rates = 1.0 / np.maximum(reach, 1) if self.rate is None else np.full(len(genomes), self.rate)
+        _flip(genomes, reach, rates, streams)
+        return genomes
+
+
+@compiled
+def _flip(genomes: Bytes, reach: Int32s, rates: Floats, streams: Streams) -> None:
+    for i in range(genomes.shape[0]):
+        for k in range(reach[i]):
+            if uniform(streams[i]) < rates[i]:
+                genomes[i, k] = below(streams[i], 256)
+
+
+@dataclass(frozen=True)
+class Renew:
+    """Every child is a new random individual."""
+
+    settings: Settings
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:  # noqa: ARG002
+        """Return the children (genomes, codons)."""
+        return initialise(self.settings, mapper, streams)
+
+
+class Scale(NamedTuple):
+    """The order of a grammar's numbers.
+
+    Attributes
+    ----------
+    numeric
+        Whether all productions of a nonterminal are numbers (nonterminals,).
+    rank
+        Each production's place among its rule's, in order of value (productions,).
+    at_rank
+        The choice that stands at each place (productions,).
+    first
+        Where each nonterminal's productions begin (nonterminals + 1,).
+    """
+
+    numeric: Bools
+    rank: Int32s
+    at_rank: Int32s
+    first: Int32s
+
+
+@lru_cache(maxsize=8)
+def _scale(grammar: Grammar) -> Scale:
+    values = [_numbers(rule) for rule in grammar.rules]
+    orders = [np.argsort(v, kind="stable") for v in values]
+    ranks = [np.argsort(order, kind="stable") for order in orders]
+    numeric = np.array([not np.isnan(v).any() and 1 < len(v) <= 256 for v in values])
+    rank, at_rank = (np.concatenate(parts).astype(np.int32) for parts in (ranks, orders))
+    return Scale(numeric, rank, at_rank, grammar.first_production)
+
+
+def _numbers(rule: Rule) -> npt.NDArray[np.float64]:
+    """Values of a rule's productions, nan where one is no number."""
+    return np.array([_number(production.parts) for production in rule.productions])
+
+
+def _number(parts: tuple[str | int, ...]) -> float:
+    try:
+        return float("".join(part if isinstance(part, str) else "?" for part in parts))
+    except ValueError:
+        return float("nan")
+
+
+@dataclass(frozen=True)
+class Creep:
+    """Codons that choose a number step to the next number up or down; at an end, inwards.
+
+    Attributes
+    ----------
+    rate
+        Probability of each such codon.
+    """
+
+    rate: float
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        mapped = mapper.map(genomes)
+        _creep(genomes, mapped.offsets, mapped.symbols, _scale(mapper.grammar), self.rate, streams)
+        return genomes
+
+
+@compiled
+def _creep(
+    genomes: Bytes, offsets: Int64s, symbols: Int32s, scale: Scale, rate: float, streams: Streams
+) -> None:
+    for i in range(genomes.shape[0]):
+        for k in range(min(offsets[i + 1] - offsets[i], genomes.shape[1])):
+            symbol = symbols[offsets[i] + k]
+            if scale.numeric[symbol] and uniform(streams[i]) < rate:
+                first, n = scale.first[symbol], scale.first[symbol + 1] - scale.first[symbol]
+                codon = int(genomes[i, k])
+                step = 1 - 2 * below(streams[i], 2)
+                rank = scale.rank[first + codon % n]
+                rank = rank + step if 0 <= rank + step < n else rank - step
+                moved = codon - codon % n + scale.at_rank[first + rank]
+                genomes[i, k] = moved if moved < 256 else moved - n

@@ -1,0 +1,61 @@
+"""Scores of programs already simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.evolution.phenotypes import DIGEST_BYTES
+from gecar.search.fitness import Scores, score_type
+
+CAPACITY = 16_384
+"""More than a run of Table 4 has evaluations; beyond it the oldest is forgotten, so that long runs stay small."""
+
+
+class ScoreCache:
+    """Scores by the digest of the program, the latest `CAPACITY` of them.
+
+    Parameters
+    ----------
+    n_arrivals, n_times
+        As in `gecar.search.fitness.score_type`.
+    """
+
+    def __init__(self, n_arrivals: int = 0, n_times: int = 0) -> None:
+        self._scores = np.zeros(CAPACITY, score_type(n_arrivals, n_times))
+        self._digests: list[bytes] = []
+        self._rows: dict[bytes, int] = {}
+        self._next = 0
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, digest: bytes) -> bool:
+        return digest in self._rows
+
+    def look_up(self, digests: Sequence[bytes]) -> Scores:
+        """Return the scores of programs that are known (digests,)."""
+        return self._scores[[self._rows[digest] for digest in digests]]
+
+    def add(self, digests: Sequence[bytes], scores: Scores) -> None:
+        """Keep the scores of programs; of those known already, the new ones."""
+        for digest, score in zip(digests, scores, strict=True):
+            if digest in self._rows:
+                self._scores[self._rows[digest]] = score
+                continue
+            if len(self._digests) < CAPACITY:
+                self._digests.append(digest)
+            else:
+                del self._rows[self._digests[self._next]]
+                self._digests[self._next] = digest
+            self._rows[digest] = self._next
+            self._scores[self._next] = score
+            self._next = (self._next + 1) % CAPACITY
+
+    def dump(self) -> tuple[npt.NDArray[np.uint8], Scores]:
+        """Return digests (n, 16) and scores (n,), the oldest first."""
+        order = np.roll(np.arange(len(self._digests)), -self._next if len(self._digests) == CAPACITY else 0)
+        raw = np.frombuffer(b"".join(self._digests), np.uint8).reshape(-1, DIGEST_BYTES)
+        return raw[order], self._scores[order]

@@ -1,0 +1,103 @@
+"""Selection: which individuals become parents."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import compiled
+from gecar.random_streams import Streams, below
+
+Floats = npt.NDArray[np.float64]
+Int32s = npt.NDArray[np.int32]
+
+
+@compiled
+def tournament(merit: Floats, size: int, streams: Streams) -> Int32s:
+    """Draw individuals with replacement and keep the best; the first drawn where several are equal.
+
+    Parameters
+    ----------
+    merit
+        Lower is better (population,).
+    size
+        Individuals in a tournament.
+    streams
+        One for each parent wanted.
+
+    Returns
+    -------
+    numpy.ndarray
+        Indices of the parents (streams,).
+    """
+    winners = np.empty(streams.size, np.int32)
+    for i in range(streams.size):
+        winner = below(streams[i], merit.size)
+        for _ in range(size - 1):
+            other = below(streams[i], merit.size)
+            if merit[other] < merit[winner]:
+                winner = other
+        winners[i] = winner
+    return winners
+
+
+def segment_times(arrival_s: Floats) -> Floats:
+    """Turn arrival times [s] into the time from checkpoint to checkpoint, inf where it was not reached."""
+    reached = np.where(np.isnan(arrival_s), np.inf, arrival_s)
+    before = np.concatenate([np.zeros((len(reached), 1)), reached[:, :-1]], axis=1)
+    return np.where(np.isinf(reached), np.inf, reached - np.where(np.isinf(before), 0.0, before))
+
+
+def deviations(cases: Floats) -> Floats:
+    """Return each case's median absolute deviation among those that have a value; 0 where none has (cases,)."""
+    allowed = np.zeros(cases.shape[1])
+    for k, column in enumerate(cases.T):
+        known = column[np.isfinite(column)]
+        if known.size:
+            allowed[k] = np.median(np.abs(known - np.median(known)))
+    return allowed
+
+
+@compiled
+def lexicase(cases: Floats, allowed: Floats, streams: Streams) -> Int32s:
+    """Go through the cases in random order; keep those as good as the best there, to what is allowed.
+
+    Parameters
+    ----------
+    cases
+        Lower is better (population, cases).
+    allowed
+        How much worse than the best of those left still stays (cases,).
+    streams
+        One for each parent wanted.
+
+    Returns
+    -------
+    numpy.ndarray
+        Indices of the parents (streams,); one drawn from those left at the end.
+    """
+    n, n_cases = cases.shape
+    winners = np.empty(streams.size, np.int32)
+    pool, order = np.empty(n, np.int32), np.empty(n_cases, np.int32)
+    for i in range(streams.size):
+        left = n
+        for k in range(n):
+            pool[k] = k
+        for k in range(n_cases):
+            order[k] = k
+        for k in range(n_cases):
+            swap = k + below(streams[i], n_cases - k)
+            order[k], order[swap] = order[swap], order[k]
+            best = np.inf
+            for j in range(left):
+                best = min(best, cases[pool[j], order[k]])
+            kept = 0
+            for j in range(left):
+                if cases[pool[j], order[k]] <= best + allowed[order[k]]:
+                    pool[kept] = pool[j]
+                    kept += 1
+            left = kept
+            if left == 1:
+                break
+        winners[i] = pool[below(streams[i], left)]
+    return winners

@@ -1,0 +1,98 @@
+"""What goes in and out of an evolution: candidates, the best so far, and all that is needed to go on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.language.program import Program
+from gecar.search.fitness import UNSOLVED, Scores
+
+Bytes = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A program that wants a score, the seed of the noise it is driven with, the best merit so far, the generation."""
+
+    program: Program
+    seed: int
+    to_beat_s: float = math.inf
+    generation: int = 0
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best individual of a run so far.
+
+    Attributes
+    ----------
+    genome
+        Its codons (codons,).
+    score
+        Dtype `gecar.search.fitness.score_type`, shape (1,).
+    generation
+        When it was found.
+    program
+        None if no genome so far maps to a program.
+    """
+
+    genome: Bytes
+    score: Scores
+    generation: int
+    program: Program | None
+
+    @property
+    def fitness_s(self) -> float:
+        """Time to GOAL [s], or 10^4."""
+        return float(self.score["fitness_s"][0])
+
+    @property
+    def merit_s(self) -> float:
+        """What selection goes by [s]."""
+        return float(self.score["merit_s"][0])
+
+    @property
+    def solved(self) -> bool:
+        """Whether it reaches GOAL."""
+        return self.fitness_s < UNSOLVED
+
+
+@dataclass(frozen=True)
+class State:
+    """All an evolution needs to go on, between two generations.
+
+    Attributes
+    ----------
+    seed
+        The run's.
+    genomes, scores
+        The population (population, codons), (population,).
+    best_genome, best_score, best_generation
+        The best so far (codons,), (1,).
+    contenders, contender_scores, contender_generations
+        The best programs so far, and when each was found (n, codons), (n,), (n,).
+    history
+        Dtype `gecar.evolution.history.HISTORY`, shape (generations so far,).
+    digests, cached
+        The score cache, oldest first (n, 16), (n,).
+    lineage
+        What a `gecar.evolution.lineage.Ledger` kept (bytes,).
+    """
+
+    seed: int
+    genomes: Bytes
+    scores: Scores
+    best_genome: Bytes
+    best_score: Scores
+    best_generation: int
+    contenders: Bytes
+    contender_scores: Scores
+    contender_generations: npt.NDArray[np.int64]
+    history: npt.NDArray[np.void]
+    digests: Bytes
+    cached: Scores
+    lineage: Bytes

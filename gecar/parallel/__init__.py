@@ -1,0 +1,1 @@
+"""Calls on other processes and machines: executors, workers' start and end, and whole calls side by side."""

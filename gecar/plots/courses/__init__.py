@@ -1,0 +1,1 @@
+"""Pictures of courses and robots, on screen and on paper."""

@@ -1,0 +1,1 @@
+"""Pictures of simulation beside recordings: verdicts, gaps, calibrations, signatures, motors."""

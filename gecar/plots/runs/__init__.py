@@ -1,0 +1,1 @@
+"""Pictures of evolutions and studies."""

@@ -1,0 +1,256 @@
+"""A run from configuration to results: new or resumed, saved after every generation."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from gecar.errors import InputError, expected
+from gecar.evolution.ask_tell import Evolution, noise_seed, rehearse, run
+from gecar.evolution.history import Generation
+from gecar.evolution.state import State
+from gecar.language.grammar import load_grammar
+from gecar.language.mapping import Mapper, MappingOptions
+from gecar.language.opcodes import MAX_DUTY_PCT
+from gecar.language.program import Program
+from gecar.language.robot_language import check_robot_language
+from gecar.parallel.executors import open_executor, side_by_side
+from gecar.results.autosave import Saver
+from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
+from gecar.results.folder import RunFolder, check_new
+from gecar.results.provenance import fingerprints, versions
+from gecar.search.batches import Batches
+from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals, chosen, times_at_steps
+from gecar.search.evaluation import DriveEvaluator
+from gecar.world.course.course import load_course
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Noise, World, simulate
+
+
+@dataclass(frozen=True)
+class Task:
+    """A configuration, and what its names stand for."""
+
+    config: Config
+    mapper: Mapper
+    world: World
+    fingerprints: Mapping[str, str]
+
+    @property
+    def configuration(self) -> str:
+        """What identifies the run: `gecar.results.config.identify`."""
+        return identify(self.config, self.fingerprints)
+
+    @property
+    def place(self) -> tuple[str, int, str]:
+        """Where programs are simulated, for `gecar.parallel.executors.open_executor`."""
+        return self.config.executor, self.config.workers, self.config.scheduler
+
+    @property
+    def evaluator(self) -> DriveEvaluator:
+        """What scores programs."""
+        search = self.config.search
+        return DriveEvaluator(
+            self.world, search.needs_arrivals, search.draws, search.arrival_share, self.config.seed
+        )
+
+    @property
+    def duty_cap_pct(self) -> int:
+        """Duty beyond which commands do the same [%]; with noise on it a command beyond the cap is another."""
+        cap = MAX_DUTY_PCT if self.world.noise != Noise() else 100.0 * self.world.robot.drive.duty_cap
+        return math.ceil(cap - 1e-9)
+
+    def evolution(self, state: State | None = None) -> Evolution:
+        """Return an evolution, new or from a state on."""
+        search, arrivals = self.config.search, self.evaluator.n_arrivals
+        if state is None:
+            return Evolution(search, self.mapper, self.config.seed, arrivals, self.duty_cap_pct)
+        return Evolution.resume(search, self.mapper, state, arrivals, self.duty_cap_pct)
+
+
+def load_task(config: Config) -> Task:
+    """Load what a configuration names.
+
+    Raises
+    ------
+    InputError
+        If there is no such grammar, course or robot, one of them is wrong, or the grammar's words are no programs.
+    """
+    grammar = load_grammar(config.grammar)
+    check_robot_language(grammar)
+    options = MappingOptions(config.wraps, config.single_choice_consumes, config.max_symbols)
+    robot, course = load_robot(config.robot), load_course(config.course)
+    noise = Noise(config.noise, 0.01 * config.motor_noise)
+    world = World(robot, course, config.step_s, config.time_limit_s, noise, config.engine)
+    return Task(config, Mapper(grammar, options), world, fingerprints(grammar, course, robot))
+
+
+@dataclass(frozen=True)
+class Started:
+    """A run that can go on: its task, its folder, and its evolution as far as it came."""
+
+    task: Task
+    folder: RunFolder
+    evolution: Evolution
+
+
+def start(config: Config, out: Path) -> Started:
+    """Begin a run in a new folder.
+
+    Raises
+    ------
+    InputError
+        If the folder exists, or as `load_task`.
+    """
+    check_new(out)
+    task = load_task(config)
+    side_by_side(*task.place)  # whoever has no cluster shall hear of it before there is a folder
+    about = {"provenance": versions(), "fingerprints": task.fingerprints}
+    return Started(task, RunFolder.create(out, as_toml(config, about)), task.evolution())
+
+
+def resume(out: Path, changes: Mapping[str, Any] | None = None) -> Started:
+    """Go on with a run where it was stopped.
+
+    Parameters
+    ----------
+    out
+        Its folder.
+    changes
+        Options given again, as for `gecar.results.config.merged`; only those that leave the result alone may differ.
+
+    Raises
+    ------
+    InputError
+        If it is no run's folder, the checkpoint is damaged, or options or files have changed since.
+    """
+    folder, place = RunFolder(out), out / "config.toml"
+    table = read_config(place)
+    config = configure(table, place)
+    wanted = configure(merged(table, changes or {}), "options")
+    found = difference(wanted, config)
+    if found:
+        raise expected("--resume", f"{found[0]} = {found[1]!r}", f"{found[2]!r} as in {place}")
+    task = load_task(wanted)
+    _check_unchanged(table, task, place)
+    folder.sweep()
+    state = folder.load(task.configuration)
+    return Started(task, folder, task.evolution(state))
+
+
+def _check_unchanged(table: Mapping[str, Any], task: Task, place: Path) -> None:
+    """Refuse where a grammar, course or robot reads otherwise now; say so where gecar or a library is another."""
+    before = table.get("fingerprints", {})
+    for kind, now in task.fingerprints.items():
+        if before.get(kind) != now:
+            name = getattr(task.config, kind)
+            raise expected(
+                "--resume", f"{kind} {name!r} changed since the run began", f"the one that {place} knows"
+            )
+    was, here = table.get("provenance", {}), versions()
+    for name in ("gecar", "numba", "numpy", "pymunk"):
+        if was.get(name) != here[name]:
+            words = (
+                f"{place}: begun with {name} {was.get(name)}, going on with {here[name]}; the end may differ"
+            )
+            print(words, file=sys.stderr)
+
+
+def finish(started: Started, after: Callable[[Generation], None] = lambda generation: None) -> dict[str, Any]:  # noqa: ARG005
+    """Run to the last generation, saving each, and write the results.
+
+    Parameters
+    ----------
+    started
+        New or resumed.
+    after
+        Called with each generation's record, once it is saved.
+
+    Returns
+    -------
+    dict
+        What result.json says.
+
+    Raises
+    ------
+    InputError
+        If a file can not be written, or workers die again and again.
+    KeyboardInterrupt
+        On Ctrl-C, after the reports are written and the way to go on is printed.
+    """
+    task, folder, evolution = started.task, started.folder, started.evolution
+    saver = Saver(folder, evolution, task.configuration)
+
+    def saved(generation: Generation) -> None:
+        saver()
+        after(generation)
+
+    try:
+        if not evolution.finished:
+            _run(task, evolution, saved)
+    except KeyboardInterrupt:
+        saver.leave()
+        raise
+    except InputError:
+        with suppress(InputError):  # the first error is the one to tell
+            saver.save()
+        raise
+    saver.save()
+    choose(task, evolution)
+    folder.write_reports(evolution)
+    return folder.write_result(evolution, measured(task, evolution))
+
+
+def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) -> None:
+    config = task.config
+    with Batches(task.evaluator, partial(open_executor, *task.place), side_by_side(*task.place)) as batches:
+        rehearse(config.search, task.mapper)
+        batches.warm()
+        run(evolution, batches, after)
+
+
+def choose(task: Task, evolution: Evolution) -> None:
+    """Choose the best of the best on fresh draws, where programs are judged by more than the nominal drive."""
+    search, contenders = task.config.search, evolution.contenders
+    programs = [contender.program.opcodes for contender in contenders if contender.program is not None]
+    if search.draws > 1 and len(programs) > 1:
+        evolution.choose(contenders[chosen(task.world, programs, search.arrival_share, evolution.seed)])
+
+
+def measured(task: Task, evolution: Evolution) -> dict[str, Any]:
+    """Return what is measured of the best program at the end: whether pymunk agrees, and how it arrives elsewhere."""
+    return {
+        "verified_on_pymunk": verified_on_pymunk(task, evolution),
+        "arrives": arrives(task.world, evolution.best.program, evolution.seed),
+    }
+
+
+def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
+    """Return how a program arrives under `REPORTED_DRAWS` fresh conditions, and at other steps, for result.json."""
+    if program is None:
+        return {"share": 0.0, "of": 0, "median_s": None, "p95_s": None, "steps": {}}
+    (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT))
+    return {
+        "share": times.share,
+        "of": REPORTED_DRAWS,
+        "median_s": times.quantile_s(0.5),
+        "p95_s": times.quantile_s(0.95),
+        "steps": times_at_steps(world, program.opcodes, noise_seed(seed, program)),
+    }
+
+
+def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:
+    """Drive the best program once more with pymunk moving the body; tell whether it ends the same within a step."""
+    best = evolution.best
+    if best.program is None:
+        return False
+    seed = noise_seed(evolution.seed, best.program)
+    own = simulate(task.world, best.program.opcodes, seed)
+    drive = simulate(replace(task.world, engine="pymunk"), best.program.opcodes, seed)
+    return drive.outcome == own.outcome and abs(drive.time_s - own.time_s) <= 1.5 * task.config.step_s

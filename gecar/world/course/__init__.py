@@ -1,0 +1,1 @@
+"""Courses: files, tiles, floor, driving order, and how fast they can be driven."""

@@ -1,0 +1,1 @@
+"""What is compiled: the robot's physics, its sensors, the interpreter, and drives made of them."""

@@ -1,0 +1,186 @@
+"""What shafts, tyres, caster and floor give each other in one step: impulses, swept over until they fit.
+
+One step solves, for both wheels at once, the impulses that would end all slip within the step, and clips them to each
+wheel's friction circle; dry friction is the torque that would stop the shaft within the step, clipped to its budget.
+Sticking then needs no special case. Beside a wheel that slid in the last sweep, the other one solves on its own.
+
+Sources: projected Gauss-Seidel on impulses, Catto, GDC 2006; friction circle, Pacejka, Tire and Vehicle Dynamics,
+ch. 1; friction as a clipped stopping torque, Duclusaud et al. (BAM), 2024.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gecar.compiled import kernel
+
+
+@kernel
+def release_contacts(s: Any) -> None:
+    """Take all impulses off; sweeps then find those of this step."""
+    s.left_friction = s.right_friction = 0.0
+    s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
+
+
+@kernel
+def sweep(s: Any, c: Any, effects: bool = True) -> bool:
+    """Go once over shafts, tyres and caster, and give each what it asks for or all it can get.
+
+    Three sweeps suffice, and mostly one does.
+
+    Parameters
+    ----------
+    s, c
+        Records of dtypes `STATE`, whose speeds and impulses are updated, and `DERIVED`.
+    effects
+        False where the robot has no play and no drag at the caster; see `gecar.world.kernel.dynamics.begin_step`.
+
+    Returns
+    -------
+    bool
+        Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
+    """
+    settled = _rub_shafts(s, c)
+    sliding = _roll(s, c, effects)
+    if effects and s.caster_circle > 0.0:
+        _drag_caster(s, c)
+        return False
+    return settled and not sliding
+
+
+@kernel
+def _rub_shafts(s: Any, c: Any) -> bool:
+    """Give each shaft the friction impulse that would stop it, within its budget.
+
+    Returns
+    -------
+    bool
+        Whether another sweep would give the same: both shafts turn, or neither moved.
+    """
+    left = min(max(s.left_friction - s.left_speed * c.rotor, -s.left_dry), s.left_dry)
+    right = min(max(s.right_friction - s.right_speed * c.rotor, -s.right_dry), s.right_dry)
+    s.left_speed += (left - s.left_friction) * c.inv_rotor
+    s.right_speed += (right - s.right_friction) * c.inv_rotor
+    settled = (abs(left) == s.left_dry or left == s.left_friction) and (
+        abs(right) == s.right_dry or right == s.right_friction
+    )
+    s.left_friction = left
+    s.right_friction = right
+    return settled
+
+
+@kernel
+def _roll(s: Any, c: Any, effects: bool) -> bool:
+    """Give both tyres the impulses that would end their slip, within their friction circles.
+
+    Returns
+    -------
+    bool
+        Whether a tyre slides, or the gears have play: another sweep is then needed.
+    """
+    left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
+    right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
+    side_slip = -(s.w + s.yaw_rate * c.axle)
+    plays = effects and c.play > 0.0
+    end_l = separation(left_slip, s.left_push, s.left_play, c.left_radius, c) if plays else left_slip
+    end_r = separation(right_slip, s.right_push, s.right_play, c.right_radius, c) if plays else right_slip
+    # As if both slid: each on its own.
+    slide_l, slide_ls = s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip
+    slide_r, slide_rs = s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip
+    left, left_side, right, right_side = slide_l, slide_ls, slide_r, slide_rs
+    free_l = s.left_slides != 0.0 or (plays and end_l == 0.0)
+    free_r = s.right_slides != 0.0 or (plays and end_r == 0.0)
+    if not free_l and not free_r:
+        # Where both hold, they share the side force as they share the load.
+        left = s.left_push + (c.m_ll * end_l + c.m_lr * end_r + c.m_ls * side_slip)
+        right = s.right_push + (c.m_rr * end_r + c.m_lr * end_l + c.m_rs * side_slip)
+        side = c.m_ls * end_l + c.m_rs * end_r + c.m_ss * side_slip
+        share = side / max(s.left_circle + s.right_circle, 1e-30)
+        left_side = s.left_side + share * s.left_circle
+        right_side = s.right_side + share * s.right_circle
+    elif not free_l:
+        left = s.left_push + (c.n_ll * end_l + c.n_ls * side_slip)
+        left_side = s.left_side + (c.n_ls * end_l + c.n_lss * side_slip)
+    elif not free_r:
+        right = s.right_push + (c.n_rr * end_r + c.n_rs * side_slip)
+        right_side = s.right_side + (c.n_rs * end_r + c.n_rss * side_slip)
+    if plays:
+        left, slide_l = _one_way(left, s.left_push, end_l), _one_way(slide_l, s.left_push, end_l)
+        right, slide_r = _one_way(right, s.right_push, end_r), _one_way(slide_r, s.right_push, end_r)
+    left, left_side, s.left_slides = _within_circle(left, left_side, s.left_circle, slide_l, slide_ls)
+    right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
+    _push(s, left, right, left_side, right_side, c)
+    return s.left_slides != 0.0 or s.right_slides != 0.0 or plays
+
+
+@kernel
+def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
+    """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
+
+    The gap leaves the slips that do not close it within the step alone. Without play the slip is returned as it is.
+    """
+    if c.play == 0.0:
+        return slip
+    low = -(c.play + play) * radius / c.dt
+    high = (c.play - play) * radius / c.dt
+    if push > 0.0:
+        return slip - high
+    if push < 0.0:
+        return slip - low
+    return slip - min(max(slip, low), high)
+
+
+@kernel
+def _one_way(new: float, old: float, end: float) -> float:
+    """Keep a gear's push from changing sides within a sweep, and from acting inside the gap."""
+    if old > 0.0:
+        return max(new, 0.0)
+    if old < 0.0:
+        return min(new, 0.0)
+    return new if new * end > 0.0 else 0.0
+
+
+@kernel
+def _within_circle(
+    push: float, side: float, circle: float, slide_push: float, slide_side: float
+) -> tuple[float, float, float]:
+    """Return a tyre's impulses, and 1 if it slides, else 0; a sliding tyre pulls along its slip, with all it has."""
+    if push * push + side * side <= circle * circle:
+        return push, side, 0.0
+    scale = circle / math.sqrt(slide_push * slide_push + slide_side * slide_side + 1e-30)
+    return slide_push * scale, slide_side * scale, 1.0
+
+
+@kernel
+def _push(s: Any, left: float, right: float, left_side: float, right_side: float, c: Any) -> None:
+    """Replace the tyres' impulses; what changes acts on body and shafts."""
+    more_left = left - s.left_push
+    more_right = right - s.right_push
+    more_side = (left_side + right_side) - (s.left_side + s.right_side)
+    s.u += (more_left + more_right) * c.inv_mass
+    s.w += more_side * c.inv_mass
+    s.yaw_rate += ((more_right - more_left) * c.half_track + more_side * c.axle) * c.inv_inertia
+    s.left_speed -= more_left * c.left_radius * c.inv_rotor
+    s.right_speed -= more_right * c.right_radius * c.inv_rotor
+    s.left_push = left
+    s.right_push = right
+    s.left_side = left_side
+    s.right_side = right_side
+
+
+@kernel
+def _drag_caster(s: Any, c: Any) -> None:
+    """Give the caster the impulse that would stop it, within its friction circle, against its motion."""
+    push = s.caster_push - c.caster_mass * s.u
+    side = s.caster_side - c.caster_mass * (s.w + s.yaw_rate * c.caster)
+    reach = push * push + side * side
+    if reach > s.caster_circle * s.caster_circle:
+        scale = s.caster_circle / math.sqrt(reach)
+        push *= scale
+        side *= scale
+    s.u += (push - s.caster_push) * c.inv_mass
+    s.w += (side - s.caster_side) * c.inv_mass
+    s.yaw_rate += (side - s.caster_side) * c.caster * c.inv_inertia
+    s.caster_push = push
+    s.caster_side = side

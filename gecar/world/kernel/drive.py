@@ -1,0 +1,219 @@
+"""The compiled drive: program, sensors, motors and body, step by step, to an outcome."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import kernel, on_stack
+from gecar.world.kernel.chipmunk import SPACE, engine_step
+from gecar.world.kernel.dynamics import drift, step, turn
+from gecar.world.kernel.interpreter import Floor, first_step_after, look, run_program, see
+from gecar.world.kernel.sensing import RING, delayed
+from gecar.world.kernel.state import place
+
+# Outcome codes; `gecar.world.rollout.Outcome` names them.
+RUNNING, GOAL, OFF_COURSE, OUT_OF_TIME, STUCK, MISSED_CHECKPOINT = range(6)
+
+
+@kernel
+def advance(
+    n: int,
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    p: Any,
+    c: Any,
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+) -> None:
+    """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
+
+    ``commands``, shape (2 RING,), remembers commands for the actuation delay, and for the half step that velocities
+    lag positions in `gecar.world.kernel.dynamics.step`. The cap on duty acts here.
+    """
+    left = min(max(left_duty, -p.duty_cap), p.duty_cap)
+    right = min(max(right_duty, -p.duty_cap), p.duty_cap)
+    if n == 0:
+        commands[:] = 0.0
+    commands[n & (RING - 1)] = left
+    commands[RING + (n & (RING - 1))] = right
+    step(s, delayed(commands, 0, n, c.late), delayed(commands, RING, n, c.late), p, c)
+    if engine[SPACE] != 0:
+        turn(s, engine_step(s, c.dt, engine, buffer, count) - s.half_turn)
+    else:
+        drift(s, c)
+
+
+@kernel
+def tile_at(x: float, y: float, floor: Floor) -> int:
+    """Return the index of the tile a point lies on, -1 outside the field."""
+    column = int(np.floor(x * floor.per_tile))
+    row = int(np.floor(y * floor.per_tile))
+    if column < 0 or row < 0 or column >= floor.columns or row >= floor.rows:
+        return -1
+    return row * floor.columns + column
+
+
+@kernel
+def arrive(
+    tile: int, passed: int, time: float, floor: Floor, arrival: npt.NDArray[np.float64]
+) -> tuple[int, int]:
+    """Return (outcome, tiles of the sequence passed) on entering a tile."""
+    if tile < 0 or not floor.drivable[tile]:
+        return OFF_COURSE, passed
+    last = floor.sequence.shape[0] - 1
+    if tile == floor.sequence[passed]:
+        arrival[passed] = time
+        return (GOAL if passed == last else RUNNING), passed + 1
+    if tile == floor.sequence[last]:
+        return MISSED_CHECKPOINT, passed
+    return RUNNING, passed
+
+
+@kernel
+def begin_program(k: Any, phase_ms: float, dt: float, s: Any, p: Any, floor: Floor) -> None:
+    """Set a program back to its first row, to begin ``phase_ms`` after the start, on the tile the robot stands on."""
+    k.row = k.line = 0
+    k.until = -1
+    k.due_ms = phase_ms
+    k.due_step = first_step_after(phase_ms, dt)
+    k.left_duty = k.right_duty = 0.0
+    k.tile = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+
+
+@kernel
+def _sample(
+    trace: npt.NDArray[np.float64], sample: int, time: float, s: Any, k: Any, p: Any, floor: Floor
+) -> None:
+    trace[sample, 0] = time
+    trace[sample, 1] = s.x - p.com_ahead * s.cos
+    trace[sample, 2] = s.y - p.com_ahead * s.sin
+    trace[sample, 3] = s.heading
+    trace[sample, 4] = k.left_duty
+    trace[sample, 5] = k.right_duty
+    trace[sample, 6] = s.left_angle
+    trace[sample, 7] = s.right_angle
+    trace[sample, 8] = see(0, s, p, floor)
+    trace[sample, 9] = k.line
+
+
+@kernel
+def drive(
+    program: npt.NDArray[np.int32],
+    physics: npt.NDArray[Any],
+    derived: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    control: npt.NDArray[Any],
+    floor: Floor,
+    start: npt.NDArray[np.float64],
+    phase_ms: float,
+    first: int,
+    last: int,
+    limit: int,
+    passed: int,
+    eyes: npt.NDArray[Any],
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+    arrival: npt.NDArray[np.float64],
+    trace: npt.NDArray[np.float64],
+    every: int,
+) -> tuple[int, int, int]:
+    """Drive from step ``first`` until an outcome, or step ``last``.
+
+    Returns
+    -------
+    tuple
+        (outcome, step it ended at, tiles of the sequence passed).
+    """
+    s = on_stack(state[0])
+    result = _drive(
+        program, physics[0], derived[0], s, control[0], floor, start, phase_ms,
+        first, last, limit, passed, eyes[0],
+        commands, engine, buffer, count, arrival, trace, every,
+    )  # fmt: skip
+    state[0] = s
+    return result
+
+
+@kernel
+def _drive(
+    program: npt.NDArray[np.int32],
+    p: Any,
+    c: Any,
+    s: Any,
+    k: Any,
+    floor: Floor,
+    start: npt.NDArray[np.float64],
+    phase_ms: float,
+    first: int,
+    last: int,
+    limit: int,
+    passed: int,
+    e: Any,
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+    arrival: npt.NDArray[np.float64],
+    trace: npt.NDArray[np.float64],
+    every: int,
+) -> tuple[int, int, int]:
+    if first == 0:
+        place(s, p, start[0], start[1], start[2])
+        begin_program(k, phase_ms, c.dt, s, p, floor)
+    remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
+    for n in range(first, last):
+        k.step = n
+        now = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+        outcome = RUNNING
+        if now != k.tile:
+            k.tile = now
+            outcome, passed = arrive(now, passed, n * c.dt, floor, arrival)
+        if outcome == RUNNING and n >= limit:
+            outcome = OUT_OF_TIME
+        if outcome == RUNNING:
+            if remembers:
+                look(n, s, p, c.dt, floor, e)
+            waits = n < k.due_step and k.until < 0
+            if not waits and not run_program(program, k, s, p, c.dt, floor, e):
+                outcome = STUCK
+        if trace.shape[0] > 0 and (n % every == 0 or outcome != RUNNING):
+            _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
+        if outcome != RUNNING:
+            return outcome, n, passed
+        advance(n, s, k.left_duty, k.right_duty, p, c, commands, engine, buffer, count)
+    return RUNNING, last, passed
+
+
+@kernel
+def hold_duties(
+    first: int,
+    last: int,
+    left_duty: float,
+    right_duty: float,
+    physics: npt.NDArray[Any],
+    derived: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    start: npt.NDArray[np.float64],
+    floor: Floor,
+    eyes: npt.NDArray[Any],
+    commands: npt.NDArray[np.float64],
+    engine: npt.NDArray[np.int64],
+    buffer: npt.NDArray[np.float64],
+    count: npt.NDArray[np.int32],
+) -> None:
+    """Hold two commands from step ``first`` to step ``last``, whoever gave them; at step 0 from the start pose."""
+    p, c, s, e = physics[0], derived[0], state[0], eyes[0]
+    if first == 0:
+        place(s, p, start[0], start[1], start[2])
+    for n in range(first, last):
+        look(n, s, p, c.dt, floor, e)
+        advance(n, s, left_duty, right_duty, p, c, commands, engine, buffer, count)
+    look(last, s, p, c.dt, floor, e)

@@ -1,0 +1,213 @@
+"""The robot's motion, written once: pure compiled functions from duty and state to the next state.
+
+Frames: the body frame has u ahead and w to the left; impulses act at the wheels' contacts, at the axle, ``half_track``
+to the left and right of its centre, and at the caster. Position and velocity are those of the centre of mass.
+
+A step turns commands into torques, sets what friction can give under each wheel's load, and lets
+`gecar.world.kernel.contacts` find the impulses; the same impulses, one step later, give the load transfer. Branches
+only lead forwards, so that a compiler can turn them into selects and take several lanes through a step at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import kernel
+from gecar.world.kernel.contacts import release_contacts, sweep
+from gecar.world.kernel.motor import (
+    awake,
+    conduct,
+    effective_duty,
+    friction_budget,
+    motor_current,
+    regulate,
+    slewed,
+    supply,
+)
+from gecar.world.kernel.series import small_cosine, small_sine
+
+STILL = 1e-15  # m/s and rad/s
+
+_EFFECT_FIELDS = (
+    "tilt_x", "tilt_y", "regulated", "start_latency", "actuation_delay", "dead_band", "direction_gain",
+    "full_duty_gain", "ripple_amplitude", "static_friction", "friction_ratio", "rolling_resistance", "patch_radius",
+    "caster_friction", "battery_drain", "battery_resistance", "backlash",
+)  # fmt: skip
+_EFFECT_LIMITS = ("command_slew", "speed_limit")
+
+
+def is_plain(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return whether robots differ from the nominal one in constants alone, shape (n,).
+
+    Parameters
+    ----------
+    physics
+        Records of dtype `PHYSICS`, shape (n,).
+    """
+    plain = np.ones(len(physics), np.bool_)
+    for field in _EFFECT_FIELDS:
+        plain &= physics[field] == 0.0
+    for field in _EFFECT_LIMITS:
+        plain &= physics[field] == np.inf
+    return plain
+
+
+@kernel
+def step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
+    """Advance velocities, shafts and contact impulses by one step; `drift` then moves the body.
+
+    Parameters
+    ----------
+    s
+        Record of dtype `STATE`, updated.
+    left_duty, right_duty
+        Commands after cap and delay [-1..1], of half a step ago: positions are those at a step's ends, velocities
+        those at its middle (leapfrog), so that path and angles are second order in the step.
+    p, c
+        Records of dtypes `PHYSICS` and `DERIVED`.
+    """
+    settled = begin_step(s, left_duty, right_duty, p, c, True)
+    if not settled and not sweep(s, c, True):
+        sweep(s, c, True)
+    end_step(s, p, c, True)
+
+
+@kernel
+def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effects: bool) -> bool:
+    """Begin a step: turn commands into torques, set what friction can give, and sweep once over the contacts.
+
+    ``effects`` is False where a robot differs from the nominal one in constants alone (`is_plain`); what then has no
+    part in the result is left out. A step is this, up to two more sweeps, and `end_step`.
+
+    Returns
+    -------
+    bool
+        Whether another sweep would change nothing.
+    """
+    # Solving along the heading at mid-step makes the path second order in the step.
+    s.half_turn = 0.5 * c.dt * s.yaw_rate
+    turn(s, s.half_turn)
+    if effects:
+        s.vx += c.tilt_x
+        s.vy += c.tilt_y
+    s.u = s.vx * s.cos + s.vy * s.sin
+    s.w = s.vy * s.cos - s.vx * s.sin
+    _run_motors(s, left_duty, right_duty, p, c, effects)
+    _set_budgets(s, p, c, effects)
+    release_contacts(s)
+    return sweep(s, c, effects)
+
+
+@kernel
+def end_step(s: Any, p: Any, c: Any, effects: bool) -> None:
+    """End a step: what the contacts left of the velocities moves the shafts; `drift` then moves the body."""
+    _settle(s)
+    s.left_angle += s.left_speed * c.dt
+    s.right_angle += s.right_speed * c.dt
+    if effects:
+        _close_play(s, c)
+        _load_battery(s, p)
+    s.vx = s.u * s.cos - s.w * s.sin
+    s.vy = s.u * s.sin + s.w * s.cos
+    s.t += c.dt
+
+
+@kernel
+def _load_battery(s: Any, p: Any) -> None:
+    """Set the current both motors draw, which lowers the voltage of the next step."""
+    if p.battery_resistance > 0.0:
+        left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
+        right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
+        # A motor that brakes does not charge the battery: the practice case with a sagging battery says so.
+        s.battery_current = max(left, 0.0) + max(right, 0.0)
+
+
+@kernel
+def drift(s: Any, c: Any) -> None:
+    """Move the body with its new velocity: what the rigid-body engine does where there is nothing to touch."""
+    s.x += s.vx * c.dt
+    s.y += s.vy * c.dt
+    s.heading += s.yaw_rate * c.dt
+    turn(s, s.yaw_rate * c.dt - s.half_turn)
+
+
+@kernel
+def turn(s: Any, angle: float) -> None:
+    """Turn the heading's cosine and sine by a small angle [rad]."""
+    sine, cosine = small_sine(angle), small_cosine(angle)
+    c, n = s.cos, s.sin
+    s.cos = c * cosine - n * sine
+    s.sin = n * cosine + c * sine
+
+
+@kernel
+def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effects: bool) -> None:
+    """Turn commands into the shafts' free speeds."""
+    s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
+    if effects:
+        if p.regulated != 0.0:
+            left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
+            right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
+        left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+        right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
+    s.left_duty, s.right_duty = left_duty, right_duty
+    s.left_drive = effective_duty(left_duty, c.left_gain, p, effects)
+    s.right_drive = effective_duty(right_duty, c.right_gain, p, effects)
+    s.left_speed = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, effects)
+    right_angle = s.right_angle + p.ripple_lead
+    s.right_speed = conduct(s.right_drive, s.voltage, right_angle, s.right_speed, p, c, effects)
+
+
+@kernel
+def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
+    """Set what dry friction, tyres and caster can give in this step.
+
+    Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
+    wheel to wheel.
+    """
+    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
+    aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
+    caster = min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
+    wheel = 0.5 * (c.weight - caster)
+    left = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
+    right = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
+    s.left_dry = friction_budget(s.left_speed, left, c.left_radius, p, c, effects)
+    s.right_dry = friction_budget(s.right_speed, right, c.right_radius, p, c, effects)
+    grip = (_grip(s, p) if effects else p.tyre_friction) * c.dt
+    s.left_circle = grip * left
+    s.right_circle = grip * right
+    s.caster_circle = p.caster_friction * caster * c.dt
+
+
+@kernel
+def _grip(s: Any, p: Any) -> float:
+    """Return the tyres' friction coefficient where the axle's centre is."""
+    if p.patch_radius > 0.0:
+        dx = s.x - p.com_ahead * s.cos - p.patch_x
+        dy = s.y - p.com_ahead * s.sin - p.patch_y
+        if dx * dx + dy * dy < p.patch_radius * p.patch_radius:
+            return p.patch_friction
+    return p.tyre_friction
+
+
+@kernel
+def _settle(s: Any) -> None:
+    """End motion too slow to matter: sticking leaves ever smaller speeds, and denormal numbers cost 50 times more."""
+    s.u = s.u if abs(s.u) > STILL else 0.0
+    s.w = s.w if abs(s.w) > STILL else 0.0
+    s.yaw_rate = s.yaw_rate if abs(s.yaw_rate) > STILL else 0.0
+    s.left_speed = s.left_speed if abs(s.left_speed) > STILL else 0.0
+    s.right_speed = s.right_speed if abs(s.right_speed) > STILL else 0.0
+
+
+@kernel
+def _close_play(s: Any, c: Any) -> None:
+    """Move the play: the wheel rolls with the ground, the shaft with the motor, at most the gap apart."""
+    if c.play > 0.0:
+        left = s.left_play + c.dt * (s.left_speed - (s.u - s.yaw_rate * c.half_track) / c.left_radius)
+        right = s.right_play + c.dt * (s.right_speed - (s.u + s.yaw_rate * c.half_track) / c.right_radius)
+        s.left_play = min(max(left, -c.play), c.play)
+        s.right_play = min(max(right, -c.play), c.play)

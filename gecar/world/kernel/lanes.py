@@ -1,0 +1,298 @@
+"""Many drives in lock step: `LANES` robots at once, so that the compiler's vector instructions serve all of them.
+
+Every lane holds one drive: a program under its own conditions (robot, start, step, noise). All lanes go through a step
+together, by the same functions that `gecar.world.kernel.drive` calls for one robot: physics stands once. A lane whose
+drive has ended takes the next one. What happens seldom, a program's statement or a new tile, is done lane by lane.
+
+The numbers of all lanes lie in one flat array, field after field, indexed ``field * LANES + lane``. A loop over the
+lanes copies its lane's fields into records on the stack, calls the scalar kernels on them, and copies back; LLVM turns
+the branches of the kernels into selects, and the loop into vector code. In one array all distances between fields are
+known when it is compiled, so that nothing has to be checked at run time.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.compiled import kernel, lane_access
+from gecar.world.effects import PHYSICS
+from gecar.world.kernel.conditions import Conditions
+from gecar.world.kernel.contacts import sweep
+from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, arrive, begin_program, tile_at
+from gecar.world.kernel.dynamics import begin_step, drift, end_step
+from gecar.world.kernel.interpreter import CONTROL, EYES, Floor, look, run_program
+from gecar.world.kernel.sensing import RING, delayed
+from gecar.world.kernel.state import DERIVED, STATE, place
+
+LANES = 8
+"""Two vectors of AVX2, one of AVX-512."""
+
+# What a lane carries beside its robot: the commands of this step and the one before, after the cap, and as they act
+# now; whether the contacts are settled; the tile; the step, the one the program or the time limit waits for,
+# and whether something has to be done now: then, or on another tile.
+_CARRIED = (
+    "left_command", "right_command", "left_before", "right_before", "left_acts", "right_acts",
+    "settled", "column", "row", "step", "wake", "due",
+)  # fmt: skip
+CARRIED = np.dtype([(field, np.float64) for field in _CARRIED])
+_P = len(STATE.names or ()) * LANES
+_C = _P + len(PHYSICS.names or ()) * LANES
+_K = _C + len(DERIVED.names or ()) * LANES
+_DUE = _K + _CARRIED.index("due") * LANES
+N_FLAT = _K + len(_CARRIED) * LANES
+
+_load_state, _store_state = lane_access(STATE, LANES, 0)
+_load_physics, _store_physics = lane_access(PHYSICS, LANES, _P)
+_load_derived, _store_derived = lane_access(DERIVED, LANES, _C)
+_load_carried, _store_carried = lane_access(CARRIED, LANES, _K)
+
+
+class Jobs(NamedTuple):
+    """Drives to make.
+
+    Attributes
+    ----------
+    rows
+        All programs' opcodes, one after the other, shape (rows, 6).
+    first_row
+        Where each program begins, and where the last ends, shape (programs + 1,).
+    used
+        Which sensors each program reads, shape (programs, 3).
+    program, condition
+        Which program drives, and under which conditions, shape (jobs,).
+    stream
+        Seed of each drive's noise, shape (jobs,).
+    """
+
+    rows: npt.NDArray[np.int32]
+    first_row: npt.NDArray[np.int64]
+    used: npt.NDArray[np.bool_]
+    program: npt.NDArray[np.int64]
+    condition: npt.NDArray[np.int64]
+    stream: npt.NDArray[np.uint64]
+
+
+class Ends(NamedTuple):
+    """How drives ended: outcome codes, steps and tiles passed, shape (jobs,); arrival times [s], shape (jobs, k)."""
+
+    outcome: npt.NDArray[np.int8]
+    steps: npt.NDArray[np.int64]
+    passed: npt.NDArray[np.int32]
+    arrival_s: npt.NDArray[np.float64]
+
+
+class Memory(NamedTuple):
+    """Working memory of the lanes; see `make_memory`."""
+
+    flat: npt.NDArray[np.float64]
+    control: npt.NDArray[Any]
+    eyes: npt.NDArray[Any]
+    commands: npt.NDArray[np.float64]
+    job: npt.NDArray[np.int64]
+    passed: npt.NDArray[np.int32]
+
+
+def make_memory() -> Memory:
+    """Return the working memory `drive_lanes` needs."""
+    return Memory(
+        np.zeros(N_FLAT),
+        np.zeros(LANES, CONTROL),
+        np.zeros(LANES, EYES),
+        np.zeros(LANES * 2 * RING),
+        np.full(LANES, -1, np.int64),
+        np.zeros(LANES, np.int32),
+    )
+
+
+def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
+    """Return the compiled `drive_lanes` for robots with effects, or for plain ones; compiled when first called.
+
+    All loops over the lanes stand in this one function, with ``effects`` a constant: LLVM makes them vector code.
+    """
+
+    def drive_lanes(  # noqa: C901, PLR0912, PLR0915
+        jobs: Jobs, under: Conditions, floor: Floor, m: Memory, ends: Ends
+    ) -> None:
+        flat = m.flat
+        waiting = 0
+        for lane in range(LANES):
+            waiting = _take(lane, waiting, jobs, under, floor, m)
+        due = True
+        while True:
+            if effects:
+                for lane in range(LANES):
+                    if m.job[lane] >= 0:
+                        _look_from(lane, floor, m)
+            if due:
+                going = False
+                for lane in range(LANES):
+                    if m.job[lane] >= 0 and flat[_DUE + lane] != 0.0:
+                        while m.job[lane] >= 0 and not _attend(lane, jobs, under, floor, m, ends):
+                            waiting = _take(lane, waiting, jobs, under, floor, m)
+                    going = going or m.job[lane] >= 0
+                if not going:
+                    return
+            if effects:
+                _act_late(m)
+            unsettled = 0
+            for lane in range(LANES):
+                s = _load_state(flat, lane)
+                p = _load_physics(flat, lane)
+                c = _load_derived(flat, lane)
+                k = _load_carried(flat, lane)
+                left = k.left_acts if effects else 0.5 * k.left_command + 0.5 * k.left_before
+                right = k.right_acts if effects else 0.5 * k.right_command + 0.5 * k.right_before
+                settled = begin_step(s, left, right, p, c, effects)
+                k.left_before, k.right_before = k.left_command, k.right_command
+                k.settled = 1.0 if settled else 0.0
+                unsettled += 0 if settled else 1
+                _store_state(flat, lane, s)
+                _store_carried(flat, lane, k)
+            if unsettled > 0:
+                for lane in range(LANES):
+                    s = _load_state(flat, lane)
+                    c = _load_derived(flat, lane)
+                    k = _load_carried(flat, lane)
+                    if k.settled == 0.0 and not sweep(s, c, effects):
+                        sweep(s, c, effects)
+                    _store_state(flat, lane, s)
+            asking = 0
+            for lane in range(LANES):
+                s = _load_state(flat, lane)
+                p = _load_physics(flat, lane)
+                c = _load_derived(flat, lane)
+                k = _load_carried(flat, lane)
+                end_step(s, p, c, effects)
+                drift(s, c)
+                k.step += 1.0
+                column = np.floor((s.x - p.com_ahead * s.cos) * floor.per_tile)
+                row = np.floor((s.y - p.com_ahead * s.sin) * floor.per_tile)
+                asks = k.step >= k.wake or column != k.column or row != k.row
+                k.due = 1.0 if asks else 0.0
+                asking += 1 if asks else 0
+                _store_state(flat, lane, s)
+                _store_carried(flat, lane, k)
+            due = asking > 0
+
+    return kernel(drive_lanes)
+
+
+_drive_plain, _drive_any = _drive_lanes_kernel(effects=False), _drive_lanes_kernel(effects=True)
+
+
+def drive_lanes(jobs: Jobs, under: Conditions, floor: Floor, memory: Memory, ends: Ends) -> None:
+    """Make all drives, from START to their outcomes.
+
+    Parameters
+    ----------
+    jobs
+        Which drives.
+    under
+        The conditions they name.
+    floor
+        The course.
+    memory
+        Working memory; its content does not matter.
+    ends
+        Filled; ``arrival_s`` where a tile was reached.
+    """
+    plain = (
+        under.plain.all()
+        and not under.physics["sensor_lag"].any()
+        and not under.physics["sensor_delay"].any()
+    )
+    (_drive_plain if plain else _drive_any)(jobs, under, floor, memory, ends)
+
+
+@kernel
+def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory) -> int:
+    """Put the next job into a lane, at rest at its start; return the number of the one after it."""
+    if waiting >= jobs.program.shape[0]:
+        m.job[lane] = -1
+        return waiting
+    m.job[lane] = waiting
+    m.passed[lane] = 0
+    condition = jobs.condition[waiting]
+    p = under.physics[condition]
+    _store_physics(m.flat, lane, p)
+    _store_derived(m.flat, lane, under.derived[condition])
+    s = _load_state(m.flat, lane)
+    place(s, p, under.start[condition, 0], under.start[condition, 1], under.start[condition, 2])
+    _store_state(m.flat, lane, s)
+    k = _load_carried(m.flat, lane)
+    k.left_command = k.right_command = k.left_before = k.right_before = k.step = 0.0
+    k.due = 1.0
+    _store_carried(m.flat, lane, k)
+    m.commands[2 * RING * lane : 2 * RING * (lane + 1)] = 0.0
+    begin_program(m.control[lane], under.phase_ms[condition], under.derived[condition].dt, s, p, floor)
+    e = m.eyes[lane]
+    for sensor in range(3):
+        e.used[sensor] = jobs.used[jobs.program[waiting], sensor]
+    e.noise_pct = under.sensor_noise_pct[condition]
+    e.motor_noise = under.motor_noise[condition]
+    e.stream = jobs.stream[waiting]
+    _look_from(lane, floor, m)
+    return waiting + 1
+
+
+@kernel
+def _look_from(lane: int, floor: Floor, m: Memory) -> None:
+    """Feed the sensors' memories of a lane, where they lag or are late."""
+    p = _load_physics(m.flat, lane)
+    if p.sensor_lag > 0.0 or p.sensor_delay > 0.0:
+        s = _load_state(m.flat, lane)
+        k = _load_carried(m.flat, lane)
+        c = _load_derived(m.flat, lane)
+        look(int(k.step), s, p, c.dt, floor, m.eyes[lane])
+
+
+@kernel
+def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, ends: Ends) -> bool:
+    """Do what is due in a lane: a tile entered, a statement; return whether its drive goes on."""
+    job = m.job[lane]
+    s = _load_state(m.flat, lane)
+    p = _load_physics(m.flat, lane)
+    c = _load_derived(m.flat, lane)
+    k = _load_carried(m.flat, lane)
+    control = m.control[lane]
+    n = int(k.step)
+    control.step = n
+    x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
+    tile = tile_at(x, y, floor)
+    limit = under.limit[jobs.condition[job]]
+    outcome = RUNNING
+    if tile != control.tile:
+        control.tile = tile
+        outcome, m.passed[lane] = arrive(tile, m.passed[lane], n * c.dt, floor, ends.arrival_s[job])
+    if outcome == RUNNING and n >= limit:
+        outcome = OUT_OF_TIME
+    if outcome == RUNNING and (n >= control.due_step or control.until >= 0):
+        first, end = jobs.first_row[jobs.program[job]], jobs.first_row[jobs.program[job] + 1]
+        if not run_program(jobs.rows[first:end], control, s, p, c.dt, floor, m.eyes[lane]):
+            outcome = STUCK
+    if outcome != RUNNING:
+        ends.outcome[job], ends.steps[job], ends.passed[job] = outcome, n, m.passed[lane]
+        return False
+    k.left_command = min(max(control.left_duty, -p.duty_cap), p.duty_cap)
+    k.right_command = min(max(control.right_duty, -p.duty_cap), p.duty_cap)
+    k.column, k.row = np.floor(x * floor.per_tile), np.floor(y * floor.per_tile)
+    k.wake = n + 1.0 if control.until >= 0 else min(control.due_step, limit) * 1.0
+    _store_carried(m.flat, lane, k)
+    return True
+
+
+@kernel
+def _act_late(m: Memory) -> None:
+    """Set the commands that act in this step, lane by lane: each with a delay of its own."""
+    for lane in range(LANES):
+        k = _load_carried(m.flat, lane)
+        c = _load_derived(m.flat, lane)
+        n, ring = int(k.step), 2 * RING * lane
+        m.commands[ring + (n & (RING - 1))] = k.left_command
+        m.commands[ring + RING + (n & (RING - 1))] = k.right_command
+        k.left_acts = delayed(m.commands, ring, n, c.late)
+        k.right_acts = delayed(m.commands, ring + RING, n, c.late)
+        _store_carried(m.flat, lane, k)

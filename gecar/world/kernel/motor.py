@@ -1,0 +1,142 @@
+"""Motors, gears and battery: pure compiled functions from duty to a shaft's speed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gecar.compiled import kernel
+from gecar.world.kernel.series import decay, sine
+
+# rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
+FULL_SPEED = math.radians(1000.0)
+
+
+FULL_DUTY = 0.999  # from here on a bridge no longer switches
+
+
+@kernel
+def conduct(
+    duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any, effects: bool = True
+) -> float:
+    """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
+
+    J dw/dt = Kt (duty V - Ke w) / R - b w, stepped exactly: the back-EMF damps the shaft within 0.1 s.
+    """
+    free = c.keep * speed
+    driven = free + c.drive_gain * duty * voltage
+    if not effects:
+        return driven
+    if c.ripple != 0.0:
+        driven += c.ripple * sine(p.ripple_cycles * angle + p.ripple_phase)
+    # Firmware may take power away to hold the limit, not reverse it.
+    driven = min(driven, max(p.speed_limit, free))
+    return max(driven, min(-p.speed_limit, free))
+
+
+@kernel
+def awake(duty: float, t: float, p: Any, c: Any) -> float:
+    """Return a duty as motors that first answer some time after the start get it; t is the step's start [s]."""
+    if p.start_latency > 0.0:
+        return duty * min(max((t + 0.5 * c.dt - p.start_latency) / c.dt, 0.0), 1.0)
+    return duty
+
+
+@kernel
+def effective_duty(duty: float, gain: float, p: Any, effects: bool = True) -> float:
+    """Return the share of the supply that reaches a motor: dead band, gain by side and direction, full duty's own."""
+    if not effects:
+        return duty * gain
+    if abs(duty) < p.dead_band:
+        return 0.0
+    past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
+    direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
+    if abs(duty) >= FULL_DUTY:
+        past *= 1.0 + p.full_duty_gain
+    return past * gain * direction
+
+
+@kernel
+def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, effects: bool = True) -> float:
+    """Return the largest impulse [N m s] dry friction can give a shaft in one step."""
+    budget = c.sliding
+    if not effects:
+        return budget
+    if p.static_friction != 0.0:
+        ratio = speed / p.stribeck_speed
+        budget += p.static_friction * c.dt * decay(ratio * ratio)
+    ratio = p.friction_ratio if speed > 0.0 else -p.friction_ratio
+    return budget * (1.0 + ratio) + p.rolling_resistance * load * radius * c.dt
+
+
+@kernel
+def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
+    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air."""
+    driven = conduct(duty, voltage, angle, speed, p, c)
+    budget = friction_budget(driven, 0.0, 0.0, p, c) * c.inv_rotor
+    return driven - min(max(driven, -budget), budget)
+
+
+@kernel
+def supply(s: Any, p: Any) -> float:
+    """Return the battery's terminal voltage [V] under the last step's current."""
+    return p.voltage * p.supply_scale - p.battery_drain * s.t - p.battery_resistance * s.battery_current
+
+
+@kernel
+def motor_current(duty: float, voltage: float, speed: float, p: Any) -> float:
+    """Return a motor's current [A]."""
+    return (duty * voltage - p.back_emf_constant * speed) / p.resistance
+
+
+@kernel
+def slewed(duty: float, last: float, c: Any) -> float:
+    """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
+    return min(max(duty, last - c.slew), last + c.slew)
+
+
+@kernel
+def regulate(command: float, speed: float, integral: float, c: Any) -> tuple[float, float]:
+    """Return (duty, integral) of a speed regulator, as `Motor.run`: 10 deg/s per percent of command.
+
+    Proportional-integral, critically damped at `REGULATOR_RATE` for the motor's own gain and time constant, without
+    a proportional part where the motor is quicker than that (`gecar.world.kernel.state`); the integral stops where the
+    duty saturates. The brick's own gains are not published in these terms.
+    """
+    error = command * FULL_SPEED - speed
+    wanted = c.regulator_p * error + integral
+    duty = min(max(wanted, -1.0), 1.0)
+    if duty == wanted:
+        integral += c.regulator_i * error
+    return duty, integral
+
+
+@kernel
+def bench_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
+    """Advance both shafts by one step; the body stays where it is.
+
+    Parameters
+    ----------
+    s
+        Record of dtype `STATE`, updated.
+    left_duty, right_duty
+        Commands after cap and delay [-1..1], of half a step ago.
+    p, c
+        Records of dtypes `PHYSICS` and `DERIVED`.
+    """
+    s.voltage = supply(s, p)
+    if p.regulated != 0.0:
+        left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
+        right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
+    s.left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+    s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
+    s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
+    s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
+    s.left_speed = bare_shaft(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c)
+    s.right_speed = bare_shaft(s.right_drive, s.voltage, s.right_angle + p.ripple_lead, s.right_speed, p, c)
+    s.left_angle += s.left_speed * c.dt
+    s.right_angle += s.right_speed * c.dt
+    left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
+    right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
+    s.battery_current = max(left, 0.0) + max(right, 0.0)
+    s.t += c.dt

@@ -1,0 +1,78 @@
+"""A robot somebody else controls: commands in, sensor readings out, millisecond by millisecond."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gecar.world.kernel.drive import hold_duties
+from gecar.world.kernel.interpreter import read_sensor
+from gecar.world.kernel.state import place
+from gecar.world.rollout import Driver, World
+
+
+class SteppedRobot:
+    """The simulated robot on its course, for controllers that are no program of ours.
+
+    Parameters
+    ----------
+    world
+        Robot, course and step.
+    seed
+        Seed of the noise, where the world has any.
+    """
+
+    def __init__(self, world: World, seed: int = 0) -> None:
+        self._driver = Driver(world)
+        self._driver.reset()
+        self._driver.eyes["used"] = True
+        self._driver.eyes["stream"] = seed
+        self._step, self._due_ms = 0, 0.0
+        self._duties = (0.0, 0.0)
+        place(self._driver.state[0], self._driver.physics[0], *self._driver.start)
+
+    def set_duty(self, left: float, right: float) -> None:
+        """Command duties [-1..1], held until the next command."""
+        self._duties = (left, right)
+
+    def advance(self, ms: float) -> None:
+        """Let time pass [ms]; what a step rounds off is made up for later."""
+        self._due_ms += ms
+        due = round(self._due_ms / (1000.0 * self._driver.world.step_s))
+        d = self._driver
+        hold_duties(
+            self._step, due, *self._duties, d.physics, d.derived, d.state, d.start, d.floor, d.eyes,
+            d.commands, d.engine, d.buffer, d.count,
+        )  # fmt: skip
+        self._step = due
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start [s]."""
+        return self._step * self._driver.world.step_s
+
+    @property
+    def reflection_pct(self) -> float:
+        """What the colour sensor reports now, whole percent."""
+        d = self._driver
+        return float(read_sensor(0, self._step, d.state[0], d.physics[0], d.world.step_s, d.floor, d.eyes[0]))
+
+    @property
+    def angles_deg(self) -> tuple[float, float]:
+        """Left and right motor angle [deg]."""
+        state = self._driver.state[0]
+        return float(np.degrees(state["left_angle"])), float(np.degrees(state["right_angle"]))
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Pose of the axle's centre [m, m, rad]."""
+        state, ahead = self._driver.state[0], float(self._driver.physics["com_ahead"][0])
+        return (
+            float(state["x"] - ahead * state["cos"]),
+            float(state["y"] - ahead * state["sin"]),
+            float(state["heading"]),
+        )
+
+    @property
+    def battery_v(self) -> float:
+        """The battery's terminal voltage [V]."""
+        return float(self._driver.state["voltage"][0]) or float(self._driver.physics["voltage"][0])
