@@ -71,7 +71,10 @@ def evolved(score: Batches | Toy) -> tuple[object, ...]:
 def test_a_cluster_evolves_what_this_process_does(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     alone = evolved(Batches(DriveEvaluator(WORLD)))
     assert side_by_side("dask", 7, address) == 2
-    for shared_from in (cluster_module.SHARED_FROM, 0):  # the recipe with each batch, or once to each worker
+    for shared_from in (
+        cluster_module.SHARED_FROM,
+        0,
+    ):  # the evaluator with each batch, or once to each worker
         monkeypatch.setattr(cluster_module, "SHARED_FROM", shared_from)
         with Batches(DriveEvaluator(WORLD), partial(open_executor, "dask", 2, address), 2) as batches:
             assert evolved(batches) == alone

@@ -22,9 +22,10 @@ from gecar.evolution.ask_tell import Evolution, run
 from gecar.evolution.state import Candidate
 from gecar.language.program import parse_program
 from gecar.parallel.executors import SerialExecutor, check_workers, open_executor
+from gecar.parallel.pickled import pickled, unpickled
 from gecar.search import batches as batches_module
 from gecar.search.batches import Batches
-from gecar.search.evaluation import DriveEvaluator, Opcodes, recipe, unpack
+from gecar.search.evaluation import DriveEvaluator, Opcodes
 from gecar.search.fitness import UNSOLVED, Scores
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
@@ -161,10 +162,10 @@ def test_a_world_travels_without_its_raster_and_drives_the_same() -> None:
     evaluator = DriveEvaluator(WORLD)
     opcodes = parse_program(FIG_6).opcodes
     score = evaluator([opcodes], [0])
-    packed = recipe(evaluator)
-    assert len(packed.pickled) < 20_000
-    assert np.array_equal(unpack(packed)([opcodes], [0]), score)
-    assert unpack(packed) is unpack(packed)
+    packed = pickled(evaluator)
+    assert len(packed.content) < 20_000
+    assert np.array_equal(unpickled(packed)([opcodes], [0]), score)
+    assert unpickled(packed) is unpickled(packed)
 
 
 @pytest.mark.parametrize("workers", [0, -1, 100_000])

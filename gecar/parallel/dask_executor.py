@@ -1,4 +1,4 @@
-"""Dask: the same batches on many machines, through its own concurrent-futures executor.
+"""Dask: the same calls on many machines, through its own concurrent-futures executor.
 
 A worker that dies is Dask's to replace, and what it had is run again by Dask; only when a batch has killed several
 workers it counts as lost. Everything about Dask is imported when it is wanted, and not before.
@@ -16,13 +16,13 @@ from typing import Any
 
 from gecar.compiled import CACHE
 from gecar.errors import InputError, expected
-from gecar.parallel.executors import sigint_ignored
-from gecar.search.evaluation import Recipe
+from gecar.parallel.pickled import Pickled
+from gecar.parallel.signals import sigint_ignored
 
 ANSWER_WITHIN_S = 10.0
 """How long a scheduler may take to answer [s]."""
 SHARED_FROM = 50_000
-"""From this size [bytes] a recipe is sent once to each worker, and not with each batch."""
+"""From this size [bytes] a pickled object is sent once to each worker, and not with each batch."""
 
 
 class DaskExecutor(Executor):
@@ -115,8 +115,8 @@ class DaskExecutor(Executor):
             raise expected("--scheduler", f"{self._where}: {said}", "a Dask scheduler that answers") from None
 
     def _share(self, argument: Any) -> Any:
-        """Replace a large recipe by Dask's name for it."""
-        if not isinstance(argument, Recipe) or len(argument.pickled) < SHARED_FROM:
+        """Replace a large pickled object by Dask's name for it."""
+        if not isinstance(argument, Pickled) or len(argument.content) < SHARED_FROM:
             return argument
         if argument.name not in self._shared:
             self._shared[argument.name] = self._client.submit(itself, argument, pure=False)
@@ -168,9 +168,9 @@ def importable(module: str) -> bool:
         return False
 
 
-def itself(recipe: Recipe) -> Recipe:
-    """Return a recipe, from then on known to Dask."""
-    return recipe
+def itself(packed: Pickled) -> Pickled:
+    """Return a pickled object, from then on known to Dask."""
+    return packed
 
 
 def check_installed() -> Any:

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
 from multiprocessing.context import BaseContext
 from typing import Any
 
 from gecar.errors import expected
+from gecar.parallel.signals import sigint_ignored, start_worker
 
 MAX_WORKERS = 1_024
 MAX_DEATHS = 3
@@ -127,22 +125,6 @@ def prepare_workers() -> None:
             forkserver.ensure_running()
 
 
-@contextmanager
-def sigint_ignored() -> Iterator[None]:
-    """Let processes started within never hear of Ctrl-C; this one hears of it afterwards, since it has to answer."""
-    if sys.platform == "win32":
-        yield
-        return
-    from multiprocessing import resource_tracker  # noqa: PLC0415  not there on every system
-
-    resource_tracker.ensure_running()  # starting it lets Ctrl-C through again, so it must not come later
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _context() -> BaseContext:
     """Return how processes are started: never by forking this one, which may have threads."""
     if sys.platform != "linux":
@@ -150,16 +132,3 @@ def _context() -> BaseContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([_PRELOADED])
     return context
-
-
-def start_worker() -> None:
-    """Prepare a worker process: Ctrl-C is its parent's business, and it ends when its parent does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -13,13 +13,12 @@ def load() -> None:
     import numpy as np  # noqa: PLC0415  all this takes time, in which the parent may end
 
     from gecar.language.opcodes import N_COLUMNS  # noqa: PLC0415
-    from gecar.search.evaluation import DriveEvaluator  # noqa: PLC0415
     from gecar.world.course.course import load_course  # noqa: PLC0415
     from gecar.world.robot import load_robot  # noqa: PLC0415
-    from gecar.world.rollout import World  # noqa: PLC0415
+    from gecar.world.rollout import World, simulate_many  # noqa: PLC0415
 
     empty = np.zeros((0, N_COLUMNS), np.int32)
-    DriveEvaluator(World(load_robot("ev3"), load_course("paper")))([empty], [0])
+    simulate_many(World(load_robot("ev3"), load_course("paper")), [empty])
 
 
 def _end_with(parent: int, loaded: threading.Event) -> None:

@@ -16,7 +16,8 @@ from gecar.errors import InputError
 from gecar.evolution.state import Candidate
 from gecar.language.opcodes import N_COLUMNS
 from gecar.parallel.executors import MAX_DEATHS, QUIET_S, SerialExecutor
-from gecar.search.evaluation import Batch, Evaluator, Scored, recipe, score_batch
+from gecar.parallel.pickled import pickled
+from gecar.search.evaluation import Batch, Evaluator, Scored, score_batch
 from gecar.search.fitness import Scores
 
 LONGEST_S = 0.1
@@ -51,7 +52,7 @@ class Batches:
     ) -> None:
         self.workers = workers
         self.busy_s = 0.0
-        self._recipe = recipe(evaluator)
+        self._evaluator = pickled(evaluator)
         self._open = open_executor
         self._executor: Executor | None = None
         self._shortest_s = shortest_s
@@ -125,7 +126,7 @@ class Batches:
         done: dict[int, Scored] = {}
         with suppress(BrokenExecutor):  # batches not sent are lost like those of the worker that died
             for k, batch in batches.items():
-                futures[k] = self._executor.submit(score_batch, self._recipe, batch)
+                futures[k] = self._executor.submit(score_batch, self._evaluator, batch)
         try:
             for k, future in futures.items():
                 with suppress(BrokenExecutor):

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-import pickle
-import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.parallel.pickled import Pickled, unpickled
 from gecar.search.chance import FIRST_DRAWS, MARGIN, ROUNDS, pool
 from gecar.search.fitness import UNSOLVED, Scores, score_type
 from gecar.world.kernel.conditions import Conditions
@@ -150,33 +148,6 @@ def n_times(draws: int) -> int:
     return ROUNDS * (draws - 1)
 
 
-class Recipe(NamedTuple):
-    """An evaluator as it travels to workers, and the name it is known by there."""
-
-    name: str
-    pickled: bytes
-
-
-def recipe(evaluator: Evaluator) -> Recipe:
-    """Pack an evaluator; this only ever goes to workers of the same run, never to a file."""
-    pickled = pickle.dumps(evaluator)
-    return Recipe(hashlib.sha256(pickled).hexdigest(), pickled)
-
-
-_unpacked = threading.local()
-_MOST_UNPACKED = 4
-
-
-def unpack(packed: Recipe) -> Evaluator:
-    """Return the evaluator; each thread of each worker unpacks it once (an evaluator is not for several threads)."""
-    known: dict[str, Evaluator] = _unpacked.__dict__
-    if packed.name not in known:
-        while len(known) >= _MOST_UNPACKED:
-            del known[next(iter(known))]
-        known[packed.name] = pickle.loads(packed.pickled)  # noqa: S301  packed by this run itself
-    return known[packed.name]
-
-
 class Scored(NamedTuple):
     """What a batch gives back: scores, and how long they took [s]."""
 
@@ -193,8 +164,9 @@ class Batch(NamedTuple):
     generation: int = 0
 
 
-def score_batch(packed: Recipe, batch: Batch) -> Scored:
+def score_batch(packed: Pickled, batch: Batch) -> Scored:
     """Score a batch; this is what executors run."""
     began = time.perf_counter()
-    scores = unpack(packed)(*batch)
+    evaluator: Evaluator = unpickled(packed)
+    scores = evaluator(*batch)
     return Scored(scores, time.perf_counter() - began)
