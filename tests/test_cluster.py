@@ -18,18 +18,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from searching import MAPPER, SMALL, Toy, fingerprint, toy_scores
+from searching import MAPPER, SMALL, Toy, fingerprint, new_evolution, toy_scores
 
 from benchmarks.concealed.runner import run_all
 from gecar.errors import InputError
-from gecar.evolution.ask_tell import Evolution, run
+from gecar.evolution.ask_tell import run
+from gecar.evolution.scores import Scores
 from gecar.parallel import dask_executor as cluster_module
 from gecar.parallel.dask_executor import run_as_here
 from gecar.parallel.executors import open_executor, side_by_side
 from gecar.results.folder import read_history, read_result
 from gecar.search.batches import Batches
 from gecar.search.evaluation import DriveEvaluator, Opcodes
-from gecar.search.fitness import Scores
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World
@@ -63,7 +63,7 @@ def address() -> Iterator[str]:
 
 
 def evolved(score: Batches | Toy) -> tuple[object, ...]:
-    evolution = Evolution(SMALL, MAPPER)
+    evolution = new_evolution(SMALL, MAPPER)
     run(evolution, score)
     return fingerprint(evolution)
 

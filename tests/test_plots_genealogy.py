@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 from command import call
 from PIL import Image
-from searching import MAPPER, SMALL, generations
+from searching import MAPPER, SMALL, generations, new_evolution
 
 from gecar.errors import InputError
-from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.lineage import Lineage
 from gecar.plots.runs.genealogy import fitness_words, genealogy, steps_of
 from gecar.plots.style import is_whole
@@ -39,7 +38,7 @@ def finished(tmp_path_factory):
 
 
 def kept(settings, n):
-    evolving = generations(Evolution(settings, MAPPER), n)
+    evolving = generations(new_evolution(settings, MAPPER), n)
     return Lineage.read(evolving.state().lineage, settings.population)
 
 

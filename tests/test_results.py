@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from searching import MAPPER, N_ARRIVALS, SMALL, generations
+from searching import MAPPER, N_ARRIVALS, SMALL, generations, new_evolution
 
 from gecar.calling import command
 from gecar.errors import InputError
@@ -321,7 +321,7 @@ def test_a_checkpoint_from_another_configuration_is_refused(stopped: Path, undis
 
 def state(n_arrivals: int = 0) -> State:
     chosen = SMALL.model_copy(update={"selection": "lexicase"}) if n_arrivals else SMALL
-    return generations(Evolution(chosen, MAPPER, 1, n_arrivals), 2).state()
+    return generations(new_evolution(chosen, MAPPER, 1, n_arrivals), 2).state()
 
 
 @pytest.mark.parametrize("n_arrivals", [0, N_ARRIVALS])

@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from searching import MAPPER, SMALL, Toy, fingerprint, generations, toy_scores
+from searching import MAPPER, SMALL, Toy, fingerprint, generations, new_evolution, toy_scores
 
 from gecar.errors import InputError
-from gecar.evolution.ask_tell import Evolution, run
+from gecar.evolution.ask_tell import run
+from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.evolution.state import Candidate
 from gecar.language.program import parse_program
 from gecar.parallel.executors import SerialExecutor, check_workers, open_executor
@@ -26,7 +27,6 @@ from gecar.parallel.pickled import pickled, unpickled
 from gecar.search import batches as batches_module
 from gecar.search.batches import Batches
 from gecar.search.evaluation import DriveEvaluator, Opcodes
-from gecar.search.fitness import UNSOLVED, Scores
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
@@ -70,7 +70,7 @@ def processes() -> Iterator[Batches]:
 
 
 def evolved(score: Batches | Toy) -> tuple[object, ...]:
-    evolution = Evolution(SMALL.model_copy(update={"codons": 200}), MAPPER)
+    evolution = new_evolution(SMALL.model_copy(update={"codons": 200}), MAPPER)
     run(evolution, score)
     return fingerprint(evolution)
 
@@ -118,7 +118,7 @@ def test_only_lost_batches_run_again() -> None:
                 raise BrokenExecutor
             return super().submit(fn, *args, **kwargs)
 
-    asked = Evolution(SMALL, MAPPER).ask()
+    asked = new_evolution(SMALL, MAPPER).ask()
     with Batches(toy_scores, Breaking, 2) as batches:
         pieces = len(batches._cut(len(asked)))
         assert np.array_equal(batches(asked), toy_scores([c.program.opcodes for c in asked]))
@@ -180,7 +180,7 @@ def test_an_unknown_executor_is_refused() -> None:
 
 
 def test_a_candidate_is_a_program_and_a_seed_below_two_to_the_64() -> None:
-    candidates: list[Candidate] = generations(Evolution(SMALL, MAPPER), 1).ask()
+    candidates: list[Candidate] = generations(new_evolution(SMALL, MAPPER), 1).ask()
     assert all(0 <= candidate.seed < 2**64 for candidate in candidates)
     assert len({candidate.seed for candidate in candidates}) == len(candidates)
 
@@ -196,7 +196,7 @@ def test_that_nobody_is_left_to_run_a_batch_is_told_once(monkeypatch, capsys) ->
             return "no worker is left"
 
     monkeypatch.setattr(batches_module, "QUIET_S", 0.02)
-    asked = Evolution(SMALL, MAPPER).ask()
+    asked = new_evolution(SMALL, MAPPER).ask()
     scores = Batches(toy_scores, Deserted)(asked)
     assert np.array_equal(scores, toy_scores([c.program.opcodes for c in asked]))
     assert capsys.readouterr().err == "no worker is left\n"

@@ -4,13 +4,23 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from searching import MAPPER, N_ARRIVALS, SMALL, Toy, fingerprint, generations
+from searching import (
+    MAPPER,
+    N_ARRIVALS,
+    SMALL,
+    Toy,
+    fingerprint,
+    generations,
+    new_evolution,
+    resume_evolution,
+)
 
 from gecar.errors import InputError
 from gecar.evolution import score_cache
 from gecar.evolution.ask_tell import Evolution, run
 from gecar.evolution.history import Patience, pace
-from gecar.search.fitness import UNSOLVED, invalid_scores, merit
+from gecar.evolution.scores import UNSOLVED, merits
+from gecar.search.programs import RobotPrograms
 from gecar.search.settings import (
     PRESETS,
     TABLE_4_CROSSOVER_RATES,
@@ -37,7 +47,7 @@ def small(name: str) -> Settings:
 
 def evolution(name: str = "paper", seed: int = 1) -> Evolution:
     chosen = small(name)
-    return Evolution(chosen, MAPPER, seed, N_ARRIVALS if chosen.needs_arrivals else 0)
+    return new_evolution(chosen, MAPPER, seed, N_ARRIVALS if chosen.needs_arrivals else 0)
 
 
 def test_the_paper_preset_is_table_4() -> None:
@@ -94,7 +104,7 @@ def test_equal_seeds_give_equal_runs_and_others_do_not(name: str) -> None:
 def test_a_resumed_run_ends_like_one_never_stopped(name: str, broken_off: int) -> None:
     whole = generations(evolution(name), 7)
     first = generations(evolution(name), broken_off)
-    again = Evolution.resume(first.settings, MAPPER, first.state(), first.n_arrivals)
+    again = resume_evolution(first.settings, MAPPER, first.state(), first.problem.n_cases)
     assert fingerprint(generations(again, 7 - broken_off)) == fingerprint(whole)
 
 
@@ -111,7 +121,7 @@ def test_a_population_that_finds_nothing_faster_begins_anew_and_the_best_stays()
     for generation in range(7):
         generations(evolving, 1)
         begun += [generation] * bool((evolving.parents < 0).all())
-        bests.append(evolving.best.fitness_s)
+        bests.append(evolving.best.merit)
     assert len(begun) > 1
     assert bests == sorted(bests, reverse=True)
     assert bests[-1] == min(record.best for record in evolving.history)
@@ -154,7 +164,7 @@ def test_a_forgotten_program_is_simulated_again_with_the_same_end(monkeypatch: p
     whole = generations(evolution("subtree, creep"), 7)
     monkeypatch.setattr(score_cache, "CAPACITY", 25)
     small_cache = generations(evolution("subtree, creep"), 4)
-    small_cache = Evolution.resume(small_cache.settings, MAPPER, small_cache.state())
+    small_cache = resume_evolution(small_cache.settings, MAPPER, small_cache.state())
     generations(small_cache, 3)
     assert np.array_equal(small_cache.genomes, whole.genomes)
     assert small_cache.totals.simulated > whole.totals.simulated
@@ -199,22 +209,22 @@ def test_a_finished_run_is_not_asked_again() -> None:
 def test_plain_seconds_are_scores_too() -> None:
     evolving = evolution()
     record = evolving.tell([float(len(candidate.program.source)) for candidate in evolving.ask()])
-    assert record.best == evolving.best.fitness_s < UNSOLVED
+    assert record.best == evolving.best.merit < UNSOLVED
     assert evolving.best.program is not None
     assert len(evolving.best.program.source) == record.best
 
 
 def test_credit_orders_what_misses_goal_and_never_reaches_above_the_cliff() -> None:
-    scores = invalid_scores(4)
-    scores["merit_s"][3] = 59.9
+    scores = RobotPrograms().failed(4)
+    scores["merit"][3] = 59.9
     scores["share"][1:3] = 0.1, 0.8
-    assert np.argsort(merit(scores, checkpoint_credit=True)).tolist() == [3, 2, 1, 0]
-    assert merit(scores, checkpoint_credit=True)[:3].min() > UNSOLVED
-    assert merit(scores, checkpoint_credit=False).tolist() == [UNSOLVED] * 3 + [59.9]
+    assert np.argsort(merits(scores, partial_credit=True)).tolist() == [3, 2, 1, 0]
+    assert merits(scores, partial_credit=True)[:3].min() > UNSOLVED
+    assert merits(scores, partial_credit=False).tolist() == [UNSOLVED] * 3 + [59.9]
 
 
 def test_invalid_genomes_score_ten_thousand() -> None:
-    evolving = Evolution(Settings(population=30, generations=1, codons=3), MAPPER, 1)
+    evolving = new_evolution(Settings(population=30, generations=1, codons=3), MAPPER, 1)
     assert evolving.ask() == []  # three codons are too few for any statement
     record = evolving.tell([])
     assert (record.best, record.mean, record.valid, record.solved) == (UNSOLVED, UNSOLVED, 0.0, 0.0)
@@ -224,13 +234,13 @@ def test_invalid_genomes_score_ten_thousand() -> None:
 def test_duplicates_are_bred_again() -> None:
     chosen = SMALL.model_copy(update={"population": 60, "generations": 20, "mutation_rate": 0.02})
     avoiding = chosen.model_copy(update={"duplicates": "run"})
-    runs = [generations(Evolution(each, MAPPER), 21) for each in (chosen, avoiding)]
+    runs = [generations(new_evolution(each, MAPPER), 21) for each in (chosen, avoiding)]
     assert runs[1].history[-1].distinct > 0.9 > runs[0].history[-1].distinct
     assert runs[1].totals.simulated > 1.5 * runs[0].totals.simulated
 
 
 def test_parents_say_whom_each_child_comes_from() -> None:
-    evolving = generations(Evolution(SMALL.model_copy(update={"mutation_rate": 0.0}), MAPPER), 1)
+    evolving = generations(new_evolution(SMALL.model_copy(update={"mutation_rate": 0.0}), MAPPER), 1)
     assert (evolving.parents == -1).all()
     before = evolving.genomes
     evolving.ask()

@@ -9,10 +9,11 @@ from searching import MAPPER, SMALL
 from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.evolution.initialisation import initialise
 from gecar.evolution.mutation import Creep, Flip
-from gecar.evolution.selection import deviations, lexicase, segment_times, tournament
+from gecar.evolution.selection import deviations, lexicase, tournament
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
 from gecar.random_streams import spawn
+from gecar.search.programs import segment_times
 
 RICH = Mapper(parse_grammar("<a> ::= <a><a> | <n>\n<n> ::= 3 | 1 | 2"))
 

@@ -127,7 +127,7 @@ def whole_run() -> Run:
     evolution = task.evolution()
     each = 0.0
     with Batches(task.evaluator) as batches:
-        rehearse(task.config.search, task.mapper)
+        rehearse(task.config.search, task.mapper, task.problem)
         batches.warm()
         began = time.process_time()
         while not evolution.finished:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from gecar.errors import expected
-from gecar.evolution.ask_tell import noise_seed
 from gecar.language.program import Program
 from gecar.results.config import Config, configure, read_config
+from gecar.search.programs import noise_seed
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World

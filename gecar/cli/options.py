@@ -1,10 +1,13 @@
-"""Options that several commands share."""
+"""Options that several commands share, and what of them was typed."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import tomllib
+from typing import Annotated, Any
 
 import typer
+
+from gecar.errors import expected
 
 WORLD = "World"
 
@@ -38,3 +41,28 @@ EngineOption = Annotated[
     typer.Option("--engine", metavar="auto|inline|pymunk", rich_help_panel=WORLD, show_default="auto",
                  help="What moves the body; auto: pymunk where the course has something to touch."),
 ]  # fmt: skip
+
+
+def given(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that were typed."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def settings(words: list[str]) -> dict[str, Any]:
+    """Read ``NAME=VALUE`` words; values are as in TOML, and words without quotes text.
+
+    Raises
+    ------
+    InputError
+        If there is no ``=``.
+    """
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise expected("--set", f"'{word}'", "NAME=VALUE")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[name] = value
+    return found

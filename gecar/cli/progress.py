@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from gecar.evolution.history import Generation, pace
-from gecar.search.fitness import UNSOLVED
+from gecar.evolution.scores import UNSOLVED
 
 PLAIN_EVERY_S = 5.0
 

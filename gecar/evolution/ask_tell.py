@@ -1,18 +1,17 @@
 """The evolution, as ask and tell: it says which programs it wants scored, and is told their scores.
 
-evolution = Evolution(Settings(), Mapper(load_grammar("paper")), seed=1)
+evolution = Evolution(EvolutionSettings(), Mapper(load_grammar("table1")), TextProblem(), seed=1)
 while not evolution.finished:
-    evolution.tell([my_fitness(candidate.program) for candidate in evolution.ask()])
-print(evolution.best.program, evolution.best.fitness_s)
+    evolution.tell([my_score(candidate.program) for candidate in evolution.ask()])
+print(evolution.best.program, evolution.best.merit)
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 import numpy.typing as npt
@@ -21,22 +20,19 @@ from gecar.errors import expected
 from gecar.evolution.breeding import Bred, Breeder
 from gecar.evolution.history import HISTORY, Generation, Patience, Totals, summary
 from gecar.evolution.lineage import Ledger
+from gecar.evolution.problem import P, Problem
 from gecar.evolution.score_cache import ScoreCache
+from gecar.evolution.scores import UNSOLVED, Scores, merits
+from gecar.evolution.settings import EvolutionSettings
 from gecar.evolution.state import Best, Candidate, State
 from gecar.language.mapping import Mapper
-from gecar.language.opcodes import MAX_DUTY_PCT
-from gecar.language.program import Program
-from gecar.search.chance import add_drives, wants_more
-from gecar.search.evaluation import n_times
-from gecar.search.fitness import UNSOLVED, Scores, as_scores, invalid_scores, merit
-from gecar.search.settings import Settings
 
 Bytes = npt.NDArray[np.uint8]
 CONTENDERS = 40
 """Best programs kept, to choose from at the end."""
 
 
-class Evolution:
+class Evolution(Generic[P]):
     """An evolution of programs.
 
     Parameters
@@ -45,41 +41,33 @@ class Evolution:
         Sizes, rates and operators.
     mapper
         What genomes derive.
+    problem
+        What derivations mean, and how scores compare.
     seed
-        Where all randomness comes from; equal seeds, equal runs.
-    n_arrivals
-        How many arrival times scores hold, for ``lexicase``.
-    duty_cap_pct
-        Duty beyond which commands do the same [%]: programs that differ only there are one program.
+        Random seed; equal seeds, equal runs.
 
     Raises
     ------
     InputError
-        If the seed is no whole number from 0 up, or lexicase has no arrival times.
+        If the seed is no whole number from 0 up, or lexicase has no cases.
     """
 
     def __init__(
-        self,
-        settings: Settings,
-        mapper: Mapper,
-        seed: int = 1,
-        n_arrivals: int = 0,
-        duty_cap_pct: int = MAX_DUTY_PCT,
+        self, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], seed: int = 1
     ) -> None:
         if not 0 <= seed < 2**64:
             raise expected("seed", seed, "a whole number from 0 to 2^64 - 1")
-        if settings.needs_arrivals and n_arrivals == 0:
-            raise expected("n_arrivals", 0, "the number of checkpoints and GOAL, for lexicase selection")
-        self.settings, self.mapper, self.seed, self.n_arrivals = settings, mapper, seed, n_arrivals
-        self.n_times = n_times(settings.draws)
+        if settings.selection == "lexicase" and problem.n_cases == 0:
+            raise expected("selection", "lexicase without cases", "scores with cases, or tournament")
+        self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
         self.history: list[Generation] = []
         self.genomes: Bytes = np.zeros((0, settings.codons), np.uint8)
-        self.scores: Scores = invalid_scores(0, n_arrivals, self.n_times)
-        self._best: Best | None = None
-        self._contenders: dict[bytes, Best] = {}
-        self._cache = ScoreCache(n_arrivals, self.n_times)
-        self._breeder = Breeder(settings, mapper, seed, duty_cap_pct)
-        self._bred: Bred | None = None
+        self.scores: Scores = problem.failed(0)
+        self._best: Best[P] | None = None
+        self._contenders: dict[bytes, Best[P]] = {}
+        self._cache = ScoreCache(problem.score_type)
+        self._breeder = Breeder(settings, mapper, problem, seed)
+        self._bred: Bred[P] | None = None
         self._parents = np.zeros((0, 2), np.int32)
         self._ledger = Ledger()
         self._patience = Patience(settings.restart_after)
@@ -89,15 +77,10 @@ class Evolution:
 
     @classmethod
     def resume(
-        cls,
-        settings: Settings,
-        mapper: Mapper,
-        state: State,
-        n_arrivals: int = 0,
-        duty_cap_pct: int = MAX_DUTY_PCT,
-    ) -> Evolution:
+        cls, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], state: State
+    ) -> Evolution[P]:
         """Go on from a state, to the same end as if there had been no break."""
-        evolution = cls(settings, mapper, state.seed, n_arrivals, duty_cap_pct)
+        evolution = cls(settings, mapper, problem, state.seed)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
         for generation in evolution.history:
             evolution._patience.see(generation.best)
@@ -105,7 +88,7 @@ class Evolution:
         evolution._ledger = Ledger(state.lineage, going_on=True)
         evolution._earlier_s = evolution.history[-1].wall_s
         evolution._cache.add([row.tobytes() for row in state.digests], state.cached)
-        program = mapper.map(state.best_genome[None]).program(0)
+        program = problem.read(mapper.map(state.best_genome[None]), 0)
         evolution._best = Best(state.best_genome, state.best_score, state.best_generation, program)
         found = zip(
             state.contenders, state.contender_scores, state.contender_generations.tolist(), strict=True
@@ -163,8 +146,8 @@ class Evolution:
         return Totals(last.evaluations, last.simulated, last.steps) if last else Totals()
 
     @property
-    def best(self) -> Best:
-        """The best individual so far; among those that miss GOAL the one that came farthest.
+    def best(self) -> Best[P]:
+        """The best individual so far; among failures the one with the greatest share.
 
         Raises
         ------
@@ -176,12 +159,12 @@ class Evolution:
         return self._best
 
     @property
-    def contenders(self) -> list[Best]:
-        """The best programs so far by merit, the best first; without drawn conditions that is the best alone."""
+    def contenders(self) -> list[Best[P]]:
+        """The best programs so far by merit, the best first; where scores never change that is the best alone."""
         ranked = sorted(self._contenders.values(), key=lambda contender: _rank(contender.score[0]))
         return ranked or [self.best]
 
-    def choose(self, contender: Best) -> None:
+    def choose(self, contender: Best[P]) -> None:
         """Make a contender the best: what looked best may have been lucky, as fresh draws show."""
         self._best = contender
 
@@ -190,11 +173,10 @@ class Evolution:
         """Whom the individuals asked for, or told of last, come from; see `gecar.evolution.breeding.Bred`."""
         return self._parents
 
-    def ask(self) -> list[Candidate]:
+    def ask(self) -> list[Candidate[P]]:
         """Breed the next generation and return the programs in it that have no score yet, each once.
 
-        With drawn conditions, also those that have arrived often enough so far, to be driven under fresh ones. There
-        may be none; `tell` them all the same.
+        Also those whose problem `wants_more` scores of them. There may be none; `tell` them all the same.
 
         Raises
         ------
@@ -208,15 +190,15 @@ class Evolution:
             self._began = time.perf_counter()
         self._bred = self._breed()
         self._parents = self._bred.parents
-        programs: dict[bytes, Program] = {}
+        programs: dict[bytes, P] = {}
         self._asked = {}
         for i, phenotype in enumerate(self._bred.phenotypes):
             if phenotype is not None and self._wants_drives(phenotype.digest):
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
-        to_beat_s = math.inf if self._best is None else self._best.merit_s
-        generation = len(self.history)
-        return [Candidate(p, noise_seed(self.seed, p), to_beat_s, generation) for p in programs.values()]
+        to_beat = math.inf if self._best is None else self._best.merit
+        generation, seed = len(self.history), self.seed
+        return [Candidate(p, self.problem.seed(p, seed), to_beat, generation) for p in programs.values()]
 
     def tell(self, results: Any) -> Generation:
         """Take the scores of the programs asked for.
@@ -224,8 +206,8 @@ class Evolution:
         Parameters
         ----------
         results
-            In the order of `ask`: scores of dtype `gecar.search.fitness.score_type`, or fitness [s] as plain
-            numbers, lower is better and 10000 for failure.
+            In the order of `ask`: scores of the problem's dtype, or plain numbers, lower is better and 10000 for
+            failure.
 
         Returns
         -------
@@ -239,39 +221,39 @@ class Evolution:
         """
         if self._bred is None:
             raise expected("tell", "no generation that waits for scores", "ask first")
-        told = self._pooled(as_scores(results, len(self._asked), self.n_arrivals, self.n_times))
+        told = self._pooled(self.problem.check(results, len(self._asked)))
         bred, scores = self._bred, self._score(self._bred, told)
         self._cache.add(list(self._asked), told)
         self.genomes, self.scores, self._bred = bred.genomes, scores, None
         self._record(bred, told)
         keys = [b"" if phenotype is None else phenotype.key for phenotype in bred.phenotypes]
-        self._ledger.add(bred.parents, bred.changed, merit(scores, checkpoint_credit=True), keys)
+        self._ledger.add(bred.parents, bred.changed, merits(scores, partial_credit=True), keys)
         return self.history[-1]
 
     def _wants_drives(self, digest: bytes) -> bool:
         if digest not in self._cache:
             return True
-        return self.n_times > 0 and wants_more(self._cache.look_up([digest])[0])
+        return self.problem.rescored and self.problem.wants_more(self._cache.look_up([digest])[0])
 
     def _pooled(self, told: Scores) -> Scores:
-        """Add to what is known of programs what was driven now."""
-        if self.n_times > 0:
+        """Add to what is known of programs what was told now."""
+        if self.problem.rescored:
             for k, digest in enumerate(self._asked):
                 if digest in self._cache:
                     known = self._cache.look_up([digest])
-                    add_drives(known[0], told[k], self.settings.arrival_share)
+                    self.problem.add(known[0], told[k])
                     told[k] = known[0]
         return told
 
-    def _breed(self) -> Bred:
+    def _breed(self) -> Bred[P]:
         generation, known = len(self.history), self._cache.__contains__
         if not self.history or self._patience.at_its_end:
             return self._breeder.begin(generation, known)
         return self._breeder.next(self.genomes, self.scores, generation, known)
 
-    def _score(self, bred: Bred, told: Scores) -> Scores:
+    def _score(self, bred: Bred[P], told: Scores) -> Scores:
         """Put together the population's scores: invalid, known before, or told now."""
-        scores = invalid_scores(len(bred.genomes), self.n_arrivals, self.n_times)
+        scores = self.problem.failed(len(bred.genomes))
         digests = {i: p.digest for i, p in enumerate(bred.phenotypes) if p is not None}
         known = [i for i, digest in digests.items() if digest not in self._asked]
         scores[known] = self._cache.look_up([digests[i] for i in known])
@@ -279,7 +261,7 @@ class Evolution:
             scores[members] = score
         return scores
 
-    def _record(self, bred: Bred, told: Scores) -> None:
+    def _record(self, bred: Bred[P], told: Scores) -> None:
         totals = Totals(
             self.totals.evaluations + len(bred.genomes),
             self.totals.simulated + len(told),
@@ -288,19 +270,19 @@ class Evolution:
         programs = len({phenotype.digest for phenotype in bred.phenotypes if phenotype is not None})
         self.history.append(summary(len(self.history), self.scores, programs, totals, self._wall_s()))
         self._patience.see(self.history[-1].best)
-        if self.n_times > 0:
+        if self.problem.rescored:
             self._keep_contenders(bred)
-        fittest = int(np.lexsort((-self.scores["share"], self.scores["merit_s"]))[0])
+        fittest = int(np.lexsort((-self.scores["share"], self.scores["merit"]))[0])
         if self._best is None or _rank(self.scores[fittest]) < _rank(self._best.score[0]):
             phenotype = bred.phenotypes[fittest]
             program = None if phenotype is None else phenotype.program
             score = self.scores[fittest : fittest + 1].copy()
             self._best = Best(bred.genomes[fittest].copy(), score, self.generation, program)
 
-    def _keep_contenders(self, bred: Bred) -> None:
+    def _keep_contenders(self, bred: Bred[P]) -> None:
         """Keep the best programs so far, with what is known of them now."""
         for i, phenotype in enumerate(bred.phenotypes):
-            if phenotype is not None and self.scores["merit_s"][i] < UNSOLVED:
+            if phenotype is not None and self.scores["merit"][i] < UNSOLVED:
                 known = self._contenders.get(phenotype.digest)
                 generation = known.generation if known else self.generation
                 score = self.scores[i : i + 1].copy()
@@ -327,8 +309,8 @@ class Evolution:
 
 
 def run(
-    evolution: Evolution,
-    score: Callable[[list[Candidate]], Any],
+    evolution: Evolution[P],
+    score: Callable[[list[Candidate[P]]], Any],
     after: Callable[[Generation], None] = lambda generation: None,  # noqa: ARG005
 ) -> None:
     """Ask and tell until an evolution is finished.
@@ -338,7 +320,7 @@ def run(
     evolution
         New or resumed.
     score
-        Scores candidates: a `gecar.search.batches.Batches`, or any function.
+        Scores candidates.
     after
         Called with each generation's record.
     """
@@ -346,17 +328,11 @@ def run(
         after(evolution.tell(score(evolution.ask())))
 
 
-def rehearse(settings: Settings, mapper: Mapper) -> None:
+def rehearse(settings: EvolutionSettings, mapper: Mapper, problem: Problem[P]) -> None:
     """Run two small generations that score nothing, so that all compiled code is there before the clock runs."""
     small = settings.model_copy(update={"population": settings.elites + 4, "generations": 1})
-    sizes = 2 if settings.needs_arrivals else 0, n_times(settings.draws)
-    run(Evolution(small, mapper, 0, sizes[0]), lambda asked: invalid_scores(len(asked), *sizes))
+    run(Evolution(small, mapper, problem, 0), lambda asked: problem.failed(len(asked)))
 
 
 def _rank(score: Any) -> tuple[float, float]:
-    return float(score["merit_s"]), -float(score["share"])
-
-
-def noise_seed(seed: int, program: Program) -> int:
-    """Return the seed of the noise a program is driven with: its own, and the same whenever the run meets it."""
-    return int.from_bytes(hashlib.blake2b(program.canonical, digest_size=8, key=seed.to_bytes(8)).digest())
+    return float(score["merit"]), -float(score["share"])

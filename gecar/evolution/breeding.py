@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +14,12 @@ from gecar.evolution.initialisation import initialise
 from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, differs
 from gecar.evolution.mutation import Creep, Flip, Renew
 from gecar.evolution.phenotypes import Phenotype, Phenotypes
-from gecar.evolution.selection import deviations, lexicase, segment_times, tournament
+from gecar.evolution.problem import P, Problem
+from gecar.evolution.scores import Scores, merits
+from gecar.evolution.selection import deviations, lexicase, tournament
+from gecar.evolution.settings import EvolutionSettings
 from gecar.language.mapping import Mapper
-from gecar.language.opcodes import MAX_DUTY_PCT
 from gecar.random_streams import Streams, spawn
-from gecar.search.fitness import Scores, merit
-from gecar.search.settings import Settings
 
 Bytes = npt.NDArray[np.uint8]
 Int32s = npt.NDArray[np.int32]
@@ -27,7 +28,7 @@ Operator = Callable[[Bytes, Mapper, Streams], Bytes]
 
 
 @dataclass(frozen=True)
-class Bred:
+class Bred(Generic[P]):
     """Individuals that wait for their scores.
 
     Attributes
@@ -44,7 +45,7 @@ class Bred:
     """
 
     genomes: Bytes
-    phenotypes: list[Phenotype | None]
+    phenotypes: list[Phenotype[P] | None]
     parents: Int32s
     changed: Bytes
 
@@ -53,7 +54,7 @@ Drawn = tuple[Bytes, Int32s, Bytes]
 """Genomes, parents and changes, as in `Bred`."""
 
 
-class Breeder:
+class Breeder(Generic[P]):
     """Breeds populations; what it breeds depends on nothing but its arguments.
 
     Parameters
@@ -62,24 +63,22 @@ class Breeder:
         Which operators.
     mapper
         What genomes derive.
+    problem
+        What derivations mean, and how scores compare.
     seed
         The run's.
-    duty_cap_pct
-        As for `gecar.evolution.ask_tell.Evolution`.
     """
 
-    def __init__(
-        self, settings: Settings, mapper: Mapper, seed: int, duty_cap_pct: int = MAX_DUTY_PCT
-    ) -> None:
-        self.settings, self.mapper, self.seed = settings, mapper, seed
-        self._phenotypes = Phenotypes(mapper, duty_cap_pct)
+    def __init__(self, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], seed: int) -> None:
+        self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
+        self._phenotypes = Phenotypes(mapper, problem)
         self._operators = _operators(settings)
 
-    def read(self, genomes: Bytes) -> list[Phenotype | None]:
+    def read(self, genomes: Bytes) -> list[Phenotype[P] | None]:
         """Return what genomes derive."""
         return self._phenotypes.read(genomes)
 
-    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred:
+    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred[P]:
         """Return a first population: that of generation 0, or of a later one that begins anew."""
         settings = self.settings
 
@@ -90,7 +89,9 @@ class Breeder:
 
         return self._without_duplicates(draw, 0, known)
 
-    def next(self, genomes: Bytes, scores: Scores, generation: int, known: Callable[[bytes], bool]) -> Bred:
+    def next(
+        self, genomes: Bytes, scores: Scores, generation: int, known: Callable[[bytes], bool]
+    ) -> Bred[P]:
         """Return the population bred from one that has its scores.
 
         Parameters
@@ -100,16 +101,16 @@ class Breeder:
         generation
             The number of the new one.
         known
-            Whether a program, by its digest, was simulated before.
+            Whether a program, by its digest, was scored before.
         """
         n_elites = self.settings.elites
-        merits = merit(scores, self.settings.checkpoint_credit)
-        elites = np.argsort(merits, kind="stable")[:n_elites].astype(np.int32)
+        ranked = merits(scores, self.problem.partial_credit)
+        elites = np.argsort(ranked, kind="stable")[:n_elites].astype(np.int32)
 
         def draw(attempt: int) -> Drawn:
             n = self.settings.population - n_elites
             streams = spawn(self.seed, generation, attempt, n + n % 2)
-            chosen = self._select(merits, scores, streams)
+            chosen = self._select(ranked, scores, streams)
             children, changed = self._vary(genomes[chosen], streams)
             pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
             if self.settings.mutation == "renew":
@@ -132,15 +133,15 @@ class Breeder:
             before = after
         return children, changed
 
-    def _select(self, merits: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
+    def _select(self, ranked: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
         if self.settings.selection == "tournament":
-            return tournament(merits, self.settings.tournament, streams)
-        cases = segment_times(scores["arrival_s"])
+            return tournament(ranked, self.settings.tournament, streams)
+        cases = self.problem.cases(scores)
         return lexicase(cases, deviations(cases), streams)
 
     def _without_duplicates(
         self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
-    ) -> Bred:
+    ) -> Bred[P]:
         """Draw individuals, and draw those again that are duplicates, as often as the settings say."""
         self._phenotypes.turn()
         genomes, parents, changed = draw(0)
@@ -158,7 +159,7 @@ class Breeder:
         return Bred(genomes, phenotypes, parents, changed)
 
 
-def _operators(settings: Settings) -> list[tuple[int, Operator]]:
+def _operators(settings: EvolutionSettings) -> list[tuple[int, Operator]]:
     """Return crossover and mutation as the settings have them, each with its bit in a lineage."""
     if settings.mutation == "renew":
         return [(MUTATION, Renew(settings))]
@@ -175,7 +176,7 @@ def _operators(settings: Settings) -> list[tuple[int, Operator]]:
 
 
 def _duplicates(
-    phenotypes: list[Phenotype | None], n_elites: int, simulated: Callable[[bytes], bool]
+    phenotypes: list[Phenotype[P] | None], n_elites: int, simulated: Callable[[bytes], bool]
 ) -> list[int]:
     """Return the individuals, elites apart, that are no program or one seen before."""
     seen: set[bytes] = set()

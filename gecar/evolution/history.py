@@ -8,7 +8,7 @@ from typing import NamedTuple, get_type_hints
 
 import numpy as np
 
-from gecar.search.fitness import INVALID, UNSOLVED, Scores
+from gecar.evolution.scores import INVALID, UNSOLVED, Scores
 
 
 class Generation(NamedTuple):
@@ -81,7 +81,7 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
     wall_s
         Time since the run began [s].
     """
-    fitness = scores["merit_s"]
+    fitness = scores["merit"]
     solved = fitness < UNSOLVED
     return Generation(
         generation=generation,

@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from gecar.evolution.settings import EvolutionSettings
 from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams
-from gecar.search.settings import Settings
 
 Bytes = npt.NDArray[np.uint8]
 Rng = np.random.Generator
 
 
-def initialise(settings: Settings, mapper: Mapper, streams: Streams) -> Bytes:
+def initialise(settings: EvolutionSettings, mapper: Mapper, streams: Streams) -> Bytes:
     """Return new random genomes, one from each stream (streams, codons)."""
     genomes = np.empty((len(streams), settings.codons), np.uint8)
     write = _PLANS[settings.initialisation]
@@ -81,7 +81,7 @@ class Plan:
         return [choice + n * int(self.rng.integers((255 - choice) // n + 1))]
 
 
-def _sensible(settings: Settings, plan: Plan) -> list[int]:
+def _sensible(settings: EvolutionSettings, plan: Plan) -> list[int]:
     """Grow a tree, or a full one, to a depth between the shallowest possible and the greatest allowed."""
     shallowest = int(plan.grammar.minimum_depth[0])
     depth = int(plan.rng.integers(shallowest, max(settings.initial_depth, shallowest) + 1))
@@ -108,7 +108,7 @@ def _tree(plan: Plan, depth: int, full: bool, most: int) -> list[int]:
     return codons
 
 
-def _ptc2(settings: Settings, plan: Plan) -> list[int]:
+def _ptc2(settings: EvolutionSettings, plan: Plan) -> list[int]:
     """Expand random open nonterminals until the tree will have the size drawn, then end each the shortest way."""
     target = int(plan.rng.integers(1, settings.initial_expansions + 1))
     chosen: dict[int, int] = {}  # production of each node
@@ -148,7 +148,7 @@ def _leftmost(plan: Plan, symbols: list[int], chosen: dict[int, int], below: dic
     return codons
 
 
-_PLANS: dict[str, Callable[[Settings, Plan], list[int]] | None] = {
+_PLANS: dict[str, Callable[[EvolutionSettings, Plan], list[int]] | None] = {
     "uniform": None,
     "sensible": _sensible,
     "ptc2": _ptc2,

@@ -12,10 +12,10 @@ import numpy.typing as npt
 from gecar.compiled import compiled
 from gecar.evolution.crossover import used_codons
 from gecar.evolution.initialisation import initialise
+from gecar.evolution.settings import EvolutionSettings
 from gecar.language.grammar import Grammar, Rule
 from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams, below, uniform
-from gecar.search.settings import Settings
 
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
@@ -62,7 +62,7 @@ def _flip(genomes: Bytes, reach: Int32s, rates: Floats, streams: Streams) -> Non
 class Renew:
     """Every child is a new random individual."""
 
-    settings: Settings
+    settings: EvolutionSettings
 
     def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:  # noqa: ARG002
         """Return the children (genomes, codons)."""

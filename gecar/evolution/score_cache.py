@@ -1,4 +1,4 @@
-"""Scores of programs already simulated."""
+"""Scores of programs already known."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.phenotypes import DIGEST_BYTES
-from gecar.search.fitness import Scores, score_type
+from gecar.evolution.scores import Scores
 
 CAPACITY = 16_384
 """More than a run of Table 4 has evaluations; beyond it the oldest is forgotten, so that long runs stay small."""
@@ -19,12 +19,12 @@ class ScoreCache:
 
     Parameters
     ----------
-    n_arrivals, n_times
-        As in `gecar.search.fitness.score_type`.
+    score_type
+        Dtype of scores.
     """
 
-    def __init__(self, n_arrivals: int = 0, n_times: int = 0) -> None:
-        self._scores = np.zeros(CAPACITY, score_type(n_arrivals, n_times))
+    def __init__(self, score_type: np.dtype[np.void]) -> None:
+        self._scores = np.zeros(CAPACITY, score_type)
         self._digests: list[bytes] = []
         self._rows: dict[bytes, int] = {}
         self._next = 0

@@ -41,13 +41,6 @@ def tournament(merit: Floats, size: int, streams: Streams) -> Int32s:
     return winners
 
 
-def segment_times(arrival_s: Floats) -> Floats:
-    """Turn arrival times [s] into the time from checkpoint to checkpoint, inf where it was not reached."""
-    reached = np.where(np.isnan(arrival_s), np.inf, arrival_s)
-    before = np.concatenate([np.zeros((len(reached), 1)), reached[:, :-1]], axis=1)
-    return np.where(np.isinf(reached), np.inf, reached - np.where(np.isinf(before), 0.0, before))
-
-
 def deviations(cases: Floats) -> Floats:
     """Return each case's median absolute deviation among those that have a value; 0 where none has (cases,)."""
     allowed = np.zeros(cases.shape[1])

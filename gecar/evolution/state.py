@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.language.program import Program
-from gecar.search.fitness import UNSOLVED, Scores
+from gecar.evolution.problem import P
+from gecar.evolution.scores import Scores
 
 Bytes = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A program that wants a score, the seed of the noise it is driven with, the best merit so far, the generation."""
+class Candidate(Generic[P]):
+    """A program that wants a score, the seed of its noise, the best merit so far, the generation."""
 
-    program: Program
+    program: P
     seed: int
-    to_beat_s: float = math.inf
+    to_beat: float = math.inf
     generation: int = 0
 
 
 @dataclass(frozen=True)
-class Best:
+class Best(Generic[P]):
     """The best individual of a run so far.
 
     Attributes
@@ -33,7 +34,7 @@ class Best:
     genome
         Its codons (codons,).
     score
-        Dtype `gecar.search.fitness.score_type`, shape (1,).
+        The problem's dtype, shape (1,).
     generation
         When it was found.
     program
@@ -43,22 +44,12 @@ class Best:
     genome: Bytes
     score: Scores
     generation: int
-    program: Program | None
+    program: P | None
 
     @property
-    def fitness_s(self) -> float:
-        """Time to GOAL [s], or 10^4."""
-        return float(self.score["fitness_s"][0])
-
-    @property
-    def merit_s(self) -> float:
-        """What selection goes by [s]."""
-        return float(self.score["merit_s"][0])
-
-    @property
-    def solved(self) -> bool:
-        """Whether it reaches GOAL."""
-        return self.fitness_s < UNSOLVED
+    def merit(self) -> float:
+        """What selection goes by; lower is better."""
+        return float(self.score["merit"][0])
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from gecar.calling import command
 from gecar.errors import InputError
 from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.state import State
+from gecar.language.program import Program
 from gecar.results.folder import RunFolder
 
 SHARE = 0.02
@@ -33,7 +34,7 @@ class Saver:
         What its checkpoints belong to.
     """
 
-    def __init__(self, folder: RunFolder, evolution: Evolution, configuration: str) -> None:
+    def __init__(self, folder: RunFolder, evolution: Evolution[Program], configuration: str) -> None:
         self.folder, self.evolution, self.configuration = folder, evolution, configuration
         self._unsaved: State | None = (
             None  # taken between two generations, whatever may interrupt the next one

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from gecar.evolution.scores import UNSOLVED
 from gecar.results.study import Planned
-from gecar.search.fitness import UNSOLVED
 
 Floats = npt.NDArray[np.float64]
 Record = Mapping[str, Any]

@@ -18,8 +18,10 @@ from gecar.calling import command
 from gecar.errors import InputError, expected
 from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.history import Generation
+from gecar.evolution.scores import UNSOLVED
 from gecar.evolution.state import State
 from gecar.files import read_text, write_whole
+from gecar.language.program import Program
 from gecar.results.checkpoint import pack, unpack
 
 REQUIRED = ("generation", "best", "mean", "valid", "distinct", "evaluations", "wall_s")
@@ -121,14 +123,14 @@ class RunFolder:
             raise expected(place, error.strerror or "an unreadable file", "a gecar checkpoint") from None
         return unpack(raw, configuration, place)
 
-    def write_reports(self, evolution: Evolution, durable: bool = True) -> None:
+    def write_reports(self, evolution: Evolution[Program], durable: bool = True) -> None:
         """Write history.csv and best.txt, if there is a generation to tell of."""
         if evolution.history:
             self.write("history.csv", history_csv(evolution.history), durable)
             program = evolution.best.program
             self.write("best.txt", f"{program}\n" if program else "", durable)
 
-    def write_result(self, evolution: Evolution, more: Mapping[str, Any]) -> dict[str, Any]:
+    def write_result(self, evolution: Evolution[Program], more: Mapping[str, Any]) -> dict[str, Any]:
         """Write result.json and return what it says.
 
         Parameters
@@ -146,12 +148,13 @@ class RunFolder:
         return result
 
 
-def outcome_of(evolution: Evolution) -> dict[str, Any]:
+def outcome_of(evolution: Evolution[Program]) -> dict[str, Any]:
     """Return what a finished evolution came to, as result.json says it."""
     best, last = evolution.best, evolution.history[-1]
+    fitness_s = float(best.score["fitness_s"][0])
     return {
-        "fitness_s": best.fitness_s,
-        "solved": best.solved,
+        "fitness_s": fitness_s,
+        "solved": fitness_s < UNSOLVED,
         "program": str(best.program or ""),
         "genome": best.genome.tolist(),
         "found_in_generation": best.generation,

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gecar.errors import InputError, expected
-from gecar.evolution.ask_tell import Evolution, noise_seed, rehearse, run
+from gecar.evolution.ask_tell import Evolution, rehearse, run
 from gecar.evolution.history import Generation
 from gecar.evolution.state import State
 from gecar.language.grammar import load_grammar
@@ -28,6 +28,7 @@ from gecar.results.provenance import fingerprints, versions
 from gecar.search.batches import Batches
 from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals, chosen, times_at_steps
 from gecar.search.evaluation import DriveEvaluator
+from gecar.search.programs import RobotPrograms, noise_seed
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
@@ -66,12 +67,17 @@ class Task:
         cap = MAX_DUTY_PCT if self.world.noise != Noise() else 100.0 * self.world.robot.drive.duty_cap
         return math.ceil(cap - 1e-9)
 
-    def evolution(self, state: State | None = None) -> Evolution:
+    @property
+    def problem(self) -> RobotPrograms:
+        """What is evolved."""
+        return RobotPrograms.of(self.config.search, self.evaluator.n_arrivals, self.duty_cap_pct)
+
+    def evolution(self, state: State | None = None) -> Evolution[Program]:
         """Return an evolution, new or from a state on."""
-        search, arrivals = self.config.search, self.evaluator.n_arrivals
+        search = self.config.search
         if state is None:
-            return Evolution(search, self.mapper, self.config.seed, arrivals, self.duty_cap_pct)
-        return Evolution.resume(search, self.mapper, state, arrivals, self.duty_cap_pct)
+            return Evolution(search, self.mapper, self.problem, self.config.seed)
+        return Evolution.resume(search, self.mapper, self.problem, state)
 
 
 def load_task(config: Config) -> Task:
@@ -97,7 +103,7 @@ class Started:
 
     task: Task
     folder: RunFolder
-    evolution: Evolution
+    evolution: Evolution[Program]
 
 
 def start(config: Config, out: Path) -> Started:
@@ -207,15 +213,15 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     return folder.write_result(evolution, measured(task, evolution))
 
 
-def _run(task: Task, evolution: Evolution, after: Callable[[Generation], None]) -> None:
+def _run(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
     config = task.config
     with Batches(task.evaluator, partial(open_executor, *task.place), side_by_side(*task.place)) as batches:
-        rehearse(config.search, task.mapper)
+        rehearse(config.search, task.mapper, task.problem)
         batches.warm()
         run(evolution, batches, after)
 
 
-def choose(task: Task, evolution: Evolution) -> None:
+def choose(task: Task, evolution: Evolution[Program]) -> None:
     """Choose the best of the best on fresh draws, where programs are judged by more than the nominal drive."""
     search, contenders = task.config.search, evolution.contenders
     programs = [contender.program.opcodes for contender in contenders if contender.program is not None]
@@ -223,7 +229,7 @@ def choose(task: Task, evolution: Evolution) -> None:
         evolution.choose(contenders[chosen(task.world, programs, search.arrival_share, evolution.seed)])
 
 
-def measured(task: Task, evolution: Evolution) -> dict[str, Any]:
+def measured(task: Task, evolution: Evolution[Program]) -> dict[str, Any]:
     """Return what is measured of the best program at the end: whether pymunk agrees, and how it arrives elsewhere."""
     return {
         "verified_on_pymunk": verified_on_pymunk(task, evolution),
@@ -245,7 +251,7 @@ def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
     }
 
 
-def verified_on_pymunk(task: Task, evolution: Evolution) -> bool:
+def verified_on_pymunk(task: Task, evolution: Evolution[Program]) -> bool:
     """Drive the best program once more with pymunk moving the body; tell whether it ends the same within a step."""
     best = evolution.best
     if best.program is None:

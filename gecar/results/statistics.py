@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from gecar.evolution.scores import UNSOLVED
 from gecar.results.cells import Cell
-from gecar.search.fitness import UNSOLVED
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,12 +13,13 @@ from typing import Self
 import numpy as np
 
 from gecar.errors import InputError
+from gecar.evolution.scores import Scores
 from gecar.evolution.state import Candidate
 from gecar.language.opcodes import N_COLUMNS
+from gecar.language.program import Program
 from gecar.parallel.executors import MAX_DEATHS, QUIET_S, SerialExecutor
 from gecar.parallel.pickled import pickled
 from gecar.search.evaluation import Batch, Evaluator, Scored, score_batch
-from gecar.search.fitness import Scores
 
 LONGEST_S = 0.1
 """Longest batch aimed at: long enough that sending it costs nothing, short enough to share work evenly."""
@@ -70,7 +71,7 @@ class Batches:
         """Start the workers and let each load what it needs, before the clock runs."""
         self._run([Batch([_EMPTY], [0])] * self.workers)
 
-    def __call__(self, candidates: Sequence[Candidate]) -> Scores:
+    def __call__(self, candidates: Sequence[Candidate[Program]]) -> Scores:
         """Return a score for each candidate.
 
         Raises
@@ -162,9 +163,7 @@ class Batches:
         )
 
 
-def _batch(candidates: Sequence[Candidate]) -> Batch:
+def _batch(candidates: Sequence[Candidate[Program]]) -> Batch:
     """Pack candidates; those of one generation have the same merit to beat."""
-    to_beat_s, generation = (
-        (candidates[0].to_beat_s, candidates[0].generation) if candidates else (math.inf, 0)
-    )
+    to_beat_s, generation = (candidates[0].to_beat, candidates[0].generation) if candidates else (math.inf, 0)
     return Batch([c.program.opcodes for c in candidates], [c.seed for c in candidates], to_beat_s, generation)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.search.fitness import UNSOLVED
+from gecar.evolution.scores import UNSOLVED
 from gecar.world.kernel.conditions import joined
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
@@ -33,6 +33,11 @@ STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 Floats = npt.NDArray[np.float64]
 
 
+def n_times(draws: int) -> int:
+    """Return how many times under drawn conditions scores hold, where each generation adds ``draws`` - 1."""
+    return ROUNDS * (draws - 1)
+
+
 def pool(score: np.void, share: float) -> None:
     """Set a score's merit and share from the drives it holds.
 
@@ -45,13 +50,13 @@ def pool(score: np.void, share: float) -> None:
         Required share of arrivals.
     """
     if score["fitness_s"] >= UNSOLVED:
-        score["merit_s"], score["share"] = UNSOLVED, 0.5 * score["share"]
+        score["merit"], score["share"] = UNSOLVED, 0.5 * score["share"]
         return
     drawn = score["drawn_s"]
     times = np.concatenate([[score["fitness_s"]], drawn[~np.isnan(drawn)]])
     arrived = np.isfinite(times)
     enough = arrived.mean() >= share
-    score["merit_s"] = np.median(times[arrived]) if enough else UNSOLVED
+    score["merit"] = np.median(times[arrived]) if enough else UNSOLVED
     score["share"] = 1.0 if enough else 0.5 + 0.5 * arrived.sum() / max(len(drawn) / ROUNDS + 1, len(times))
 
 
@@ -67,7 +72,7 @@ def add_drives(score: np.void, more: np.void, share: float) -> None:
 
 def wants_more(score: np.void) -> bool:
     """Whether a program met again is to be driven again: it has arrived often enough so far, and has room."""
-    return bool(score["merit_s"] < UNSOLVED and np.isnan(score["drawn_s"]).any())
+    return bool(score["merit"] < UNSOLVED and np.isnan(score["drawn_s"]).any())
 
 
 class Arrivals(NamedTuple):

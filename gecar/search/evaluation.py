@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.parallel.pickled import Pickled, unpickled
-from gecar.search.chance import FIRST_DRAWS, MARGIN, ROUNDS, pool
-from gecar.search.fitness import UNSOLVED, Scores, score_type
+from gecar.search.chance import FIRST_DRAWS, MARGIN, n_times, pool
+from gecar.search.fitness import score_type
 from gecar.world.kernel.conditions import Conditions
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
@@ -80,7 +81,7 @@ class DriveEvaluator:
         for field in ("outcome", "checkpoints", "time_s", "steps"):
             scores[field] = summary[field]
         solved = summary["outcome"] == Outcome.GOAL
-        scores["fitness_s"] = scores["merit_s"] = np.where(solved, summary["time_s"], UNSOLVED)
+        scores["fitness_s"] = scores["merit"] = np.where(solved, summary["time_s"], UNSOLVED)
         scores["share"] = self._shares(arrival)
         scores["arrival_s"] = arrival[:, : self.n_arrivals]
         scores["drawn_s"] = np.nan
@@ -141,11 +142,6 @@ class DriveEvaluator:
 
 
 _NEXT_STREAM = np.uint64(0x9E3779B97F4A7C15)
-
-
-def n_times(draws: int) -> int:
-    """Return how many times under drawn conditions scores hold, where each generation adds ``draws`` - 1."""
-    return ROUNDS * (draws - 1)
 
 
 class Scored(NamedTuple):

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gecar.cli.commands.evolve import settings
+from gecar.cli.options import settings
 from gecar.cli.output import Output, plain
 from gecar.compiled import is_cold, mark_warm
 from gecar.errors import expected

@@ -14,9 +14,10 @@ from gecar.cli.options import (
     NoiseOption,
     RobotOption,
     TimeLimitOption,
+    given,
+    settings,
 )
 from gecar.cli.output import JsonOption, Output
-from gecar.errors import expected
 
 SEARCH, RUN = "Search (default: the preset's)", "Run"
 
@@ -128,30 +129,3 @@ def evolve(
     from gecar.cli.actions.evolve import begin, run_to_the_end
 
     run_to_the_end(output, begin(config, changes, out, resume), pictures=not no_pictures, quiet=quiet)
-
-
-def given(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that were typed."""
-    return {name: value for name, value in options.items() if value is not None}
-
-
-def settings(words: list[str]) -> dict[str, Any]:
-    """Read ``NAME=VALUE`` words; values are as in TOML, and words without quotes text.
-
-    Raises
-    ------
-    InputError
-        If there is no ``=``.
-    """
-    import tomllib
-
-    found: dict[str, Any] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not equals or not name:
-            raise expected("--set", f"'{word}'", "NAME=VALUE")
-        try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            found[name] = value
-    return found

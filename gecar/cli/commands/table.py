@@ -14,6 +14,8 @@ from gecar.cli.options import (
     NoiseOption,
     RobotOption,
     TimeLimitOption,
+    given,
+    settings,
 )
 from gecar.cli.output import JsonOption, Output
 
@@ -116,7 +118,6 @@ def table(
     if executor == "process" and workers != 1:
         prepare_workers()  # they load beside this process
     from gecar.cli.actions.table import Asked, study
-    from gecar.cli.commands.evolve import given, settings
 
     search = {"population": population, "generations": generations}
     options = {

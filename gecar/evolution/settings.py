@@ -1,0 +1,97 @@
+"""What an evolution does: sizes, rates and which operators, with the paper's Table 4 as the default."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+MAX_CODONS_IN_ALL = 200_000_000
+"""Most codons of a whole population: 200 MB."""
+
+Rate = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+
+
+class EvolutionSettings(BaseModel):
+    """What any evolution does; the defaults are the paper's Table 4.
+
+    Attributes
+    ----------
+    population, generations
+        Individuals, and how often they are bred anew after the first population.
+    codons
+        Gene length: codons 0..255 of each genome.
+    elites
+        Best individuals that stay as they are.
+    initialisation
+        ``uniform``: random codons. ``sensible``: derivation trees grown or full, up to `initial_depth`
+        (Ryan and Azad 2003). ``ptc2``: trees of 1 to `initial_expansions` expansions, expanded at random
+        places (Luke 2000, Nicolau 2017).
+    initial_depth
+        Greatest depth of a ``sensible`` tree.
+    initial_expansions
+        Most codons a ``ptc2`` tree aims at.
+    selection
+        ``tournament``; or ``lexicase``: by the problem's cases, in random order, each as good as the best within
+        the median absolute deviation (Spector 2012, La Cava 2016).
+    tournament
+        Individuals in a tournament.
+    crossover
+        ``one_point``: anywhere in the genome, the same point in both. ``one_point_used``: within the codons
+        both parents use. ``variable_one_point``: within the codons each parent uses, a point of its own in either
+        (PonyGE2's default). ``subtree``: subtrees of the same nonterminal change places.
+    crossover_rate
+        Share of pairs that are crossed.
+    mutation
+        ``codon``: any codon of the genome. ``used_codon``: only codons the child uses. ``one_used_codon``: the
+        same with one codon a child on average, whatever `mutation_rate` says (PonyGE2's default). ``renew``:
+        every child is a new random individual, which makes the whole a random search.
+    mutation_rate
+        Probability of a codon to be drawn anew.
+    creep_rate
+        Probability of a used codon that chooses a number to step to a neighbouring one.
+    duplicates
+        ``kept``; or bred again, up to `attempts` times, where the same program is already in the
+        ``generation``, or was scored before in the ``run``.
+    attempts
+        How often a duplicate is bred again.
+    restart_after
+        Generations without a better program once one succeeds, after which a new population begins; the best so far
+        stays the run's result. 0: never.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    population: int = Field(200, ge=2, le=1_000_000)
+    generations: int = Field(50, ge=0, le=1_000_000)
+    codons: int = Field(1_000, ge=1, le=1_000_000)
+    elites: int = Field(1, ge=0)
+    initialisation: Literal["uniform", "sensible", "ptc2"] = "uniform"
+    initial_depth: int = Field(8, ge=1, le=1_000)
+    initial_expansions: int = Field(40, ge=1, le=10_000)
+    selection: Literal["tournament", "lexicase"] = "tournament"
+    tournament: int = Field(5, ge=1, le=1_000_000)
+    crossover: Literal["one_point", "one_point_used", "variable_one_point", "subtree"] = "one_point"
+    crossover_rate: Rate = 0.5
+    mutation: Literal["codon", "used_codon", "one_used_codon", "renew"] = "codon"
+    mutation_rate: Rate = 0.05
+    creep_rate: Rate = 0.0
+    duplicates: Literal["kept", "generation", "run"] = "kept"
+    attempts: int = Field(10, ge=1, le=1_000)
+    restart_after: int = Field(0, ge=0, le=1_000_000)
+
+    @model_validator(mode="after")
+    def _fits(self) -> EvolutionSettings:
+        if self.elites >= self.population:
+            raise ValueError(
+                f"found elites = {self.elites}, expected fewer than population = {self.population}"
+            )
+        if self.population * self.codons > MAX_CODONS_IN_ALL:
+            size = f"{self.population} x {self.codons} codons"
+            raise ValueError(f"found population x codons = {size}, expected at most {MAX_CODONS_IN_ALL}")
+        return self
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of a whole run, the first population included."""
+        return self.population * (self.generations + 1)
