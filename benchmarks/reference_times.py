@@ -17,12 +17,11 @@ import math
 import sys
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import compiled
+from gecar.compiled import kernel
 from gecar.files import write_whole
 from gecar.language.program import parse_program
 from gecar.plots.courses.course import draw_course
@@ -30,8 +29,7 @@ from gecar.plots.style import BLUE, GREEN, headline, look, new_figure, save
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.world.course.course import Course, list_courses, load_course
 from gecar.world.course.reference_times import TABLE, reference_table
-from gecar.world.kernel.drive import advance, arrive, tile_at
-from gecar.world.kernel.interpreter import Floor
+from gecar.world.kernel.drive import GOAL, RUNNING, Setup, advance, begin_program, enter_tile
 from gecar.world.kernel.state import place
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Drive, Driver, Outcome, World, simulate
@@ -55,18 +53,11 @@ TURNS_BACK = math.radians(100.0)  # from here on a bend may be driven as a chang
 Array = npt.NDArray[np.float64]
 
 
-@compiled
+@kernel
 def pursue(
     points: npt.NDArray[np.float64],
-    p: Any,
-    c: Any,
-    s: Any,
-    floor: Floor,
-    start: npt.NDArray[np.float64],
-    commands: npt.NDArray[np.float64],
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
+    setup: Setup,
+    arrival: npt.NDArray[np.float64],
     duties: npt.NDArray[np.int32],
     every: int,
 ) -> tuple[int, int, float]:
@@ -77,6 +68,10 @@ def pursue(
     points
         x, y [m], steering [1/rad], how far before it to turn to the next [m], and 1 forwards or -1 backwards,
         shape (n, 5).
+    setup
+        The robot, the course, and their memory.
+    arrival
+        Filled with the time each tile of the sequence is reached at [s], shape (k,).
     duties
         Filled with the commands [%], one for each ``every`` steps, shape (m, 2).
 
@@ -85,23 +80,19 @@ def pursue(
     tuple
         (outcome, steps, cost: the time in s, or how far from GOAL it ended).
     """
-    place(s, p, start[0], start[1], start[2])
-    arrival = np.zeros(floor.sequence.shape[0])
-    passed, target, outcome = 0, 0, 0
-    last_x, last_y = start[0], start[1]
-    x, y = start[0], start[1]
-    tile = tile_at(x, y, floor)
+    p, c, s, k, floor = setup.physics[0], setup.derived[0], setup.state[0], setup.control[0], setup.floor
+    x, y = last_x, last_y = setup.start[0], setup.start[1]
+    place(s, p, x, y, setup.start[2])
+    begin_program(k, 0.0, c.dt, s, p, floor)
+    passed, target, outcome = 0, 0, RUNNING
     left = right = 0.0
     steps = duties.shape[0] * every
     n = 0
     while n < steps:
         x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
-        now = tile_at(x, y, floor)
-        if now != tile:
-            tile = now
-            outcome, passed = arrive(now, passed, n * c.dt, floor, arrival)
-            if outcome != 0:
-                break
+        outcome, passed = enter_tile(n, s, p, c, k, floor, passed, arrival)
+        if outcome != RUNNING:
+            break
         if n % every == 0:
             while target < points.shape[0] - 1:
                 dx, dy = points[target, 0] - last_x, points[target, 1] - last_y
@@ -121,9 +112,9 @@ def pursue(
                 left, right = (-1.0, -inner) if turn > 0.0 else (-inner, -1.0)
             left, right = round(100.0 * p.duty_cap * left) / 100.0, round(100.0 * p.duty_cap * right) / 100.0
             duties[n // every, 0], duties[n // every, 1] = round(100.0 * left), round(100.0 * right)
-        advance(n, s, left, right, p, c, commands, engine, buffer, count)
+        advance(n, s, left, right, p, c, setup.commands, setup.engine)
         n += 1
-    if outcome == 1:
+    if outcome == GOAL:
         return outcome, n, n * c.dt
     goal = floor.sequence[min(passed, floor.sequence.shape[0] - 1)]
     gx, gy = (goal % floor.columns + 0.5) / floor.per_tile, (goal // floor.columns + 0.5) / floor.per_tile
@@ -137,6 +128,7 @@ class Search:
     def __init__(self, robot: Robot, course: Course, longest_s: float = LONGEST_S) -> None:
         self.world = World(robot, course, time_limit_s=longest_s)
         self._driver = Driver(self.world)
+        self._arrival = np.zeros(len(self._driver.setup.floor.sequence))
         self._duties = np.zeros((round(longest_s / (EVERY * self.world.step_s)), 2), np.int32)
         self._bends, self._backs = _targets(course)
 
@@ -174,10 +166,7 @@ class Search:
         """Drive towards points: return the time [s], or what it costs not to get there, and the commands [%]."""
         d = self._driver
         d.reset()
-        _, steps, cost = pursue(
-            points, d.physics[0], d.derived[0], d.state[0], d.floor, d.start, d.commands, d.engine, d.buffer, d.count,
-            self._duties, EVERY,
-        )  # fmt: skip
+        _, steps, cost = pursue(points, d.setup, self._arrival, self._duties, EVERY)
         return cost, self._duties[: -(-steps // EVERY)]
 
 

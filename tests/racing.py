@@ -11,7 +11,7 @@ from gecar.compiled import compiled
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.world.course.course import Course
 from gecar.world.course.lower_bound.fastest_time import sprint, travelled
-from gecar.world.kernel.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.kernel.chipmunk import NO_ENGINE
 from gecar.world.kernel.drive import advance
 from gecar.world.kernel.sensing import RING
 from gecar.world.kernel.state import DERIVED, STATE, derive, place
@@ -19,12 +19,12 @@ from gecar.world.robot import Robot
 
 
 @compiled
-def _outer_wheel(duties, hold, half_track, p, c, s, dt, commands, engine, buffer, count):
+def _outer_wheel(duties, hold, half_track, p, c, s, dt, commands, engine):
     derive(p, dt, c)
     place(s, p, 0.0, 0.0, 0.0)
     x, y, heading, outer = 0.0, 0.0, 0.0, 0.0
     for n in range(duties.shape[0] * hold):
-        advance(n, s, duties[n // hold, 0], duties[n // hold, 1], p, c, commands, engine, buffer, count)
+        advance(n, s, duties[n // hold, 0], duties[n // hold, 1], p, c, commands, engine)
         dx, dy = s.x - p.com_ahead * s.cos - x, s.y - p.com_ahead * s.sin - y
         middle = 0.5 * (s.heading + heading)
         outer += abs(dx * math.cos(middle) + dy * math.sin(middle)) + half_track * abs(s.heading - heading)
@@ -43,7 +43,7 @@ def beyond_the_bound(robot: Robot, duties, seconds: float, dt: float = 0.002) ->
     half_track = 0.5 * p["track_width"][0] * p["track_scale"][0] * max(1.0 - fast.exchange, 0.0)
     outer, away = _outer_wheel(
         np.clip(np.asarray(duties, float), -1.0, 1.0), hold, half_track, p[0], np.zeros(1, DERIVED)[0],
-        np.zeros(1, STATE)[0], dt, np.zeros(2 * RING), NO_ENGINE, NO_BUFFER, NO_COUNT,
+        np.zeros(1, STATE)[0], dt, np.zeros(2 * RING), NO_ENGINE,
     )  # fmt: skip
     allowed = travelled(fast, time_s) + fast.play_m
     return outer - allowed, away - allowed

@@ -39,8 +39,8 @@ class Fleet:
     def __init__(self, base: str = "ev3", course: Course = PAPER_COURSE, step_s: float = STEP_S) -> None:
         self.course = course
         self._driver = Driver(World(load_robot(base), course, step_s, LONGEST_S))
-        self._nominal = self._driver.physics.copy()
-        self._floor, self._step_s = self._driver.floor, step_s
+        self._nominal = self._driver.setup.physics.copy()
+        self._step_s = step_s
 
     @property
     def start(self) -> Floats:
@@ -56,15 +56,15 @@ class Fleet:
         seed: int = 0,
     ) -> Drive:
         """Drive with some of the robot's constants replaced, from a pose [m, m, rad]."""
-        d = self._driver
-        d.physics[:] = self._nominal
+        setup = self._driver.setup
+        setup.physics[:] = self._nominal
         for field, value in constants.items():
-            d.physics[field] = value
-        derive(d.physics[0], self._step_s, d.derived[0])
-        d.start = start
-        d.floor = self._floor._replace(averaged=self.course.averaged(float(d.physics["spot_diameter"][0])))
-        d.eyes["noise_pct"] = noise_pct
-        return d.simulate(OPCODES, seed, trace)
+            setup.physics[field] = value
+        derive(setup.physics[0], self._step_s, setup.derived[0])
+        setup.eyes["noise_pct"] = noise_pct
+        averaged = self.course.averaged(float(setup.physics["spot_diameter"][0]))
+        self._driver.setup = setup._replace(start=start, floor=setup.floor._replace(averaged=averaged))
+        return self._driver.simulate(OPCODES, seed, trace)
 
 
 def turns(drive: Drive) -> int:

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from gecar.errors import expected
 from gecar.language.opcodes import N_COLUMNS, TEST
 from gecar.world.course.course import Course
-from gecar.world.kernel.chipmunk import NO_BUFFER, NO_COUNT, NO_ENGINE
+from gecar.world.kernel.chipmunk import NO_ENGINE
 from gecar.world.kernel.conditions import Conditions, conditions, select
-from gecar.world.kernel.drive import drive
+from gecar.world.kernel.drive import Setup, drive
 from gecar.world.kernel.interpreter import CONTROL, EYES, Floor
 from gecar.world.kernel.lanes import Ends, Jobs, drive_lanes, make_memory
 from gecar.world.kernel.sensing import RING
@@ -196,18 +196,23 @@ class Driver:
     def __init__(self, world: World, under: Conditions | None = None) -> None:
         under = world.nominal if under is None else under
         self.world = world
-        self.physics, self.derived, self.start = under.physics, under.derived, under.start[0]
-        self.phase_ms, self.limit = float(under.phase_ms[0]), int(under.limit[0])
         self.step_s = float(under.derived["dt"][0])
-        self.state = np.zeros(1, STATE)
-        self.control = np.zeros(1, CONTROL)
-        self.floor = world.floor
         self.obstacles: list[Any] = []
-        self.commands = np.zeros(2 * RING)
-        self.eyes = np.zeros(1, EYES)
-        self.eyes["noise_pct"] = under.sensor_noise_pct
-        self.eyes["motor_noise"] = under.motor_noise
-        self.engine, self.buffer, self.count = NO_ENGINE, NO_BUFFER, NO_COUNT
+        eyes = np.zeros(1, EYES)
+        eyes["noise_pct"], eyes["motor_noise"] = under.sensor_noise_pct, under.motor_noise
+        self.setup = Setup(
+            under.physics,
+            under.derived,
+            under.start[0],
+            float(under.phase_ms[0]),
+            int(under.limit[0]),
+            world.floor,
+            np.zeros(1, STATE),
+            np.zeros(1, CONTROL),
+            eyes,
+            np.zeros(2 * RING),
+            NO_ENGINE,
+        )
 
     def simulate(self, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
         """Drive a program from START to its outcome.
@@ -222,22 +227,18 @@ class Driver:
             Whether to keep the time series.
         """
         self.reset()
-        every = round(TRACE_S / self.step_s)
-        arrival = np.full(len(self.floor.sequence), np.nan)
-        self.eyes["used"] = sensors_used(opcodes)
-        self.eyes["stream"] = seed
-        samples = np.full((self.limit // every + 2 if trace else 0, len(TRACE_COLUMNS)), np.nan)
+        setup, every = self.setup, round(TRACE_S / self.step_s)
+        arrival = np.full(len(setup.floor.sequence), np.nan)
+        setup.eyes["used"] = sensors_used(opcodes)
+        setup.eyes["stream"] = seed
+        samples = np.full((setup.limit // every + 2 if trace else 0, len(TRACE_COLUMNS)), np.nan)
         poses: list[list[tuple[float, float, float]]] = []
-        chunk = every if trace and self.obstacles else self.limit + 1
+        chunk = every if trace and self.obstacles else setup.limit + 1
         outcome, n, passed = 0, 0, 0
         while outcome == Outcome.RUNNING:
             poses.append([(*body.position, body.angle) for body in self.obstacles])
-            outcome, n, passed = drive(
-                opcodes, self.physics, self.derived, self.state, self.control, self.floor, self.start, self.phase_ms,
-                n, n + chunk, self.limit, passed, self.eyes, self.commands,
-                self.engine, self.buffer, self.count, arrival, samples, every,
-            )  # fmt: skip
-        checkpoints = min(passed, len(self.floor.sequence) - 1)
+            outcome, n, passed = drive(opcodes, setup, n, n + chunk, passed, arrival, samples, every)
+        checkpoints = min(passed, len(setup.floor.sequence) - 1)
         kept = samples[~np.isnan(samples[:, 0])]
         return Drive(
             Outcome(outcome),
@@ -252,9 +253,9 @@ class Driver:
     def reset(self) -> None:
         """Put everything that can be touched back where the course has it."""
         if self.world.uses_pymunk:
-            x, y, heading = self.start
-            self._keep, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)
-            self.engine, self.buffer, self.count = self._keep.addresses, self._keep.buffer, self._keep.count
+            x, y, heading = self.setup.start
+            self._engine, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)
+            self.setup = self.setup._replace(engine=self._engine.arrays)
 
 
 def simulate(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:

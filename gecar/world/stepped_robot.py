@@ -24,11 +24,12 @@ class SteppedRobot:
     def __init__(self, world: World, seed: int = 0) -> None:
         self._driver = Driver(world)
         self._driver.reset()
-        self._driver.eyes["used"] = True
-        self._driver.eyes["stream"] = seed
+        self._setup = self._driver.setup
+        self._setup.eyes["used"] = True
+        self._setup.eyes["stream"] = seed
         self._step, self._due_ms = 0, 0.0
         self._duties = (0.0, 0.0)
-        place(self._driver.state[0], self._driver.physics[0], *self._driver.start)
+        place(self._setup.state[0], self._setup.physics[0], *self._setup.start)
 
     def set_duty(self, left: float, right: float) -> None:
         """Command duties [-1..1], held until the next command."""
@@ -38,11 +39,7 @@ class SteppedRobot:
         """Let time pass [ms]; what a step rounds off is made up for later."""
         self._due_ms += ms
         due = round(self._due_ms / (1000.0 * self._driver.world.step_s))
-        d = self._driver
-        hold_duties(
-            self._step, due, *self._duties, d.physics, d.derived, d.state, d.start, d.floor, d.eyes,
-            d.commands, d.engine, d.buffer, d.count,
-        )  # fmt: skip
+        hold_duties(self._step, due, *self._duties, self._setup)
         self._step = due
 
     @property
@@ -53,19 +50,19 @@ class SteppedRobot:
     @property
     def reflection_pct(self) -> float:
         """What the colour sensor reports now, whole percent."""
-        d = self._driver
-        return float(read_sensor(0, self._step, d.state[0], d.physics[0], d.world.step_s, d.floor, d.eyes[0]))
+        s, step_s = self._setup, self._driver.step_s
+        return float(read_sensor(0, self._step, s.state[0], s.physics[0], step_s, s.floor, s.eyes[0]))
 
     @property
     def angles_deg(self) -> tuple[float, float]:
         """Left and right motor angle [deg]."""
-        state = self._driver.state[0]
+        state = self._setup.state[0]
         return float(np.degrees(state["left_angle"])), float(np.degrees(state["right_angle"]))
 
     @property
     def pose(self) -> tuple[float, float, float]:
         """Pose of the axle's centre [m, m, rad]."""
-        state, ahead = self._driver.state[0], float(self._driver.physics["com_ahead"][0])
+        state, ahead = self._setup.state[0], float(self._setup.physics["com_ahead"][0])
         return (
             float(state["x"] - ahead * state["cos"]),
             float(state["y"] - ahead * state["sin"]),
@@ -75,4 +72,4 @@ class SteppedRobot:
     @property
     def battery_v(self) -> float:
         """The battery's terminal voltage [V]."""
-        return float(self._driver.state["voltage"][0]) or float(self._driver.physics["voltage"][0])
+        return float(self._setup.state["voltage"][0]) or float(self._setup.physics["voltage"][0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +21,29 @@ from pymunk._chipmunk_cffi import ffi, lib  # the batch functions' addresses are
 
 from gecar.compiled import kernel
 
-# Rows of the address table a kernel receives; all zero: no engine, the kernel moves the body itself.
+# Rows of the address table a kernel receives.
 SPACE, BODY, STEP, READ, WRITE, REQUEST = range(6)
-NO_ENGINE = np.zeros(6, np.int64)
-NO_BUFFER = np.zeros(1)
-NO_COUNT = np.zeros(1, np.int32)
+
+
+class EngineArrays(NamedTuple):
+    """What a kernel needs to step a pymunk space.
+
+    Attributes
+    ----------
+    addresses
+        Address table, shape (6,); all zero: no engine, the kernel moves the body itself.
+    buffer
+        Where the batch functions put and find the body's fields, shape (64,).
+    filled
+        How many of them, shape (1,).
+    """
+
+    addresses: npt.NDArray[np.int64]
+    buffer: npt.NDArray[np.float64]
+    filled: npt.NDArray[np.int32]
+
+
+NO_ENGINE = EngineArrays(np.zeros(6, np.int64), np.zeros(1), np.zeros(1, np.int32))
 
 # The batch functions grow a buffer (by realloc, fatal for one of ours) before it is quite full.
 _ROOM = 64
@@ -60,13 +78,7 @@ def _call_pointers(typing: Any, function: Any, first: Any, second: Any) -> Any: 
 
 
 @kernel
-def engine_step(
-    s: Any,
-    dt: float,
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
-) -> float:
+def engine_step(s: Any, dt: float, engine: EngineArrays) -> float:
     """Let pymunk move the robot and everything it touches by one step.
 
     Returns
@@ -75,13 +87,14 @@ def engine_step(
         How far the body turned [rad].
     """
     before = s.heading
+    address, buffer, filled = engine.addresses, engine.buffer, engine.filled
     buffer[0], buffer[1], buffer[2] = s.x, s.y, s.heading
     buffer[3], buffer[4], buffer[5] = s.vx, s.vy, s.yaw_rate
-    count[0] = 0
-    _call_pointers(engine[WRITE], engine[BODY], engine[REQUEST])  # type: ignore[call-arg]
-    _call_pointer_double(engine[STEP], engine[SPACE], dt)
-    count[0] = 0
-    _call_pointers(engine[READ], engine[BODY], engine[REQUEST])
+    filled[0] = 0
+    _call_pointers(address[WRITE], address[BODY], address[REQUEST])  # type: ignore[call-arg]
+    _call_pointer_double(address[STEP], address[SPACE], dt)
+    filled[0] = 0
+    _call_pointers(address[READ], address[BODY], address[REQUEST])
     s.x, s.y, s.heading = buffer[0], buffer[1], buffer[2]
     s.vx, s.vy, s.yaw_rate = buffer[3], buffer[4], buffer[5]
     return s.heading - before
@@ -95,17 +108,15 @@ class Engine:
     ----------
     space, body
         pymunk's own objects; the robot's body has its origin at the centre of mass.
-    addresses
-        Address table for kernels, shape (6,).
-    buffer, count
-        Where the batch functions put and find the body's fields, shapes (64,) and (1,).
+    arrays
+        For kernels.
+    keep_alive
+        What the addresses point to.
     """
 
     space: pymunk.Space
     body: pymunk.Body
-    addresses: npt.NDArray[np.int64]
-    buffer: npt.NDArray[np.float64]
-    count: npt.NDArray[np.int32]
+    arrays: EngineArrays
     keep_alive: tuple[Any, ...]
 
 
@@ -122,7 +133,7 @@ def make_engine(space: pymunk.Space, body: pymunk.Body) -> Engine:
     floats.num, floats.max, floats.arr = 0, len(buffer), held
     request = ffi.new("pmBatchedData *")
     request.fields, request.floatArray, request.intArray = _MOTION, floats, ints
-    count = np.frombuffer(ffi.buffer(ffi.addressof(floats, "num")), np.int32)
+    filled = np.frombuffer(ffi.buffer(ffi.addressof(floats, "num")), np.int32)
     addresses = np.zeros(6, np.int64)
     addresses[SPACE] = _address(space._space)  # noqa: SLF001 - pymunk has no public handle for C callers
     addresses[BODY] = _address(body._body)  # noqa: SLF001
@@ -130,4 +141,4 @@ def make_engine(space: pymunk.Space, body: pymunk.Body) -> Engine:
     addresses[READ] = _address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
     addresses[WRITE] = _address(ffi.addressof(lib, "pmSpaceBodySetIteratorFuncBatched"))
     addresses[REQUEST] = _address(request)
-    return Engine(space, body, addresses, buffer, count, (floats, ints, request, held))
+    return Engine(space, body, EngineArrays(addresses, buffer, filled), (floats, ints, request, held))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import kernel, on_stack
-from gecar.world.kernel.chipmunk import SPACE, engine_step
+from gecar.world.kernel.chipmunk import SPACE, EngineArrays, engine_step
 from gecar.world.kernel.dynamics import drift, step, turn
 from gecar.world.kernel.interpreter import Floor, first_step_after, look, run_program, see
 from gecar.world.kernel.sensing import RING, delayed
@@ -16,6 +16,40 @@ from gecar.world.kernel.state import place
 
 # Outcome codes; `gecar.world.rollout.Outcome` names them.
 RUNNING, GOAL, OFF_COURSE, OUT_OF_TIME, STUCK, MISSED_CHECKPOINT = range(6)
+
+
+class Setup(NamedTuple):
+    """A robot set up to drive: one row of `gecar.world.kernel.conditions.Conditions`, a floor, and what kernels write.
+
+    Attributes
+    ----------
+    physics, derived
+        Of dtypes `PHYSICS` and `DERIVED`, shape (1,).
+    start
+        Pose of the axle's centre [m, m, rad], shape (3,).
+    phase_ms, limit
+        When the program begins [ms]; steps until the time is out.
+    floor
+        The course.
+    state, control, eyes
+        Of dtypes `STATE`, `CONTROL` and `EYES`, shape (1,).
+    commands
+        Commands remembered for the actuation delay, shape (2 RING,).
+    engine
+        pymunk's, or `NO_ENGINE`.
+    """
+
+    physics: npt.NDArray[Any]
+    derived: npt.NDArray[Any]
+    start: npt.NDArray[np.float64]
+    phase_ms: float
+    limit: int
+    floor: Floor
+    state: npt.NDArray[Any]
+    control: npt.NDArray[Any]
+    eyes: npt.NDArray[Any]
+    commands: npt.NDArray[np.float64]
+    engine: EngineArrays
 
 
 @kernel
@@ -27,9 +61,7 @@ def advance(
     p: Any,
     c: Any,
     commands: npt.NDArray[np.float64],
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
+    engine: EngineArrays,
 ) -> None:
     """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
 
@@ -43,8 +75,8 @@ def advance(
     commands[n & (RING - 1)] = left
     commands[RING + (n & (RING - 1))] = right
     step(s, delayed(commands, 0, n, c.late), delayed(commands, RING, n, c.late), p, c)
-    if engine[SPACE] != 0:
-        turn(s, engine_step(s, c.dt, engine, buffer, count) - s.half_turn)
+    if engine.addresses[SPACE] != 0:
+        turn(s, engine_step(s, c.dt, engine) - s.half_turn)
     else:
         drift(s, c)
 
@@ -103,24 +135,24 @@ def _sample(
 
 
 @kernel
+def enter_tile(
+    n: int, s: Any, p: Any, c: Any, k: Any, floor: Floor, passed: int, arrival: npt.NDArray[np.float64]
+) -> tuple[int, int]:
+    """Look which tile the robot is on at step ``n``; return (outcome, tiles of the sequence passed)."""
+    tile = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
+    if tile == k.tile:
+        return RUNNING, passed
+    k.tile = tile
+    return arrive(tile, passed, n * c.dt, floor, arrival)
+
+
+@kernel
 def drive(
     program: npt.NDArray[np.int32],
-    physics: npt.NDArray[Any],
-    derived: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    control: npt.NDArray[Any],
-    floor: Floor,
-    start: npt.NDArray[np.float64],
-    phase_ms: float,
+    setup: Setup,
     first: int,
     last: int,
-    limit: int,
     passed: int,
-    eyes: npt.NDArray[Any],
-    commands: npt.NDArray[np.float64],
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
     arrival: npt.NDArray[np.float64],
     trace: npt.NDArray[np.float64],
     every: int,
@@ -132,51 +164,33 @@ def drive(
     tuple
         (outcome, step it ended at, tiles of the sequence passed).
     """
-    s = on_stack(state[0])
-    result = _drive(
-        program, physics[0], derived[0], s, control[0], floor, start, phase_ms,
-        first, last, limit, passed, eyes[0],
-        commands, engine, buffer, count, arrival, trace, every,
-    )  # fmt: skip
-    state[0] = s
+    s = on_stack(setup.state[0])
+    result = _drive(program, setup, s, first, last, passed, arrival, trace, every)
+    setup.state[0] = s
     return result
 
 
 @kernel
 def _drive(
     program: npt.NDArray[np.int32],
-    p: Any,
-    c: Any,
+    setup: Setup,
     s: Any,
-    k: Any,
-    floor: Floor,
-    start: npt.NDArray[np.float64],
-    phase_ms: float,
     first: int,
     last: int,
-    limit: int,
     passed: int,
-    e: Any,
-    commands: npt.NDArray[np.float64],
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
     arrival: npt.NDArray[np.float64],
     trace: npt.NDArray[np.float64],
     every: int,
 ) -> tuple[int, int, int]:
+    p, c, k, e, floor = setup.physics[0], setup.derived[0], setup.control[0], setup.eyes[0], setup.floor
     if first == 0:
-        place(s, p, start[0], start[1], start[2])
-        begin_program(k, phase_ms, c.dt, s, p, floor)
+        place(s, p, setup.start[0], setup.start[1], setup.start[2])
+        begin_program(k, setup.phase_ms, c.dt, s, p, floor)
     remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
     for n in range(first, last):
         k.step = n
-        now = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
-        outcome = RUNNING
-        if now != k.tile:
-            k.tile = now
-            outcome, passed = arrive(now, passed, n * c.dt, floor, arrival)
-        if outcome == RUNNING and n >= limit:
+        outcome, passed = enter_tile(n, s, p, c, k, floor, passed, arrival)
+        if outcome == RUNNING and n >= setup.limit:
             outcome = OUT_OF_TIME
         if outcome == RUNNING:
             if remembers:
@@ -188,32 +202,17 @@ def _drive(
             _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
         if outcome != RUNNING:
             return outcome, n, passed
-        advance(n, s, k.left_duty, k.right_duty, p, c, commands, engine, buffer, count)
+        advance(n, s, k.left_duty, k.right_duty, p, c, setup.commands, setup.engine)
     return RUNNING, last, passed
 
 
 @kernel
-def hold_duties(
-    first: int,
-    last: int,
-    left_duty: float,
-    right_duty: float,
-    physics: npt.NDArray[Any],
-    derived: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    start: npt.NDArray[np.float64],
-    floor: Floor,
-    eyes: npt.NDArray[Any],
-    commands: npt.NDArray[np.float64],
-    engine: npt.NDArray[np.int64],
-    buffer: npt.NDArray[np.float64],
-    count: npt.NDArray[np.int32],
-) -> None:
+def hold_duties(first: int, last: int, left_duty: float, right_duty: float, setup: Setup) -> None:
     """Hold two commands from step ``first`` to step ``last``, whoever gave them; at step 0 from the start pose."""
-    p, c, s, e = physics[0], derived[0], state[0], eyes[0]
+    p, c, s, e = setup.physics[0], setup.derived[0], setup.state[0], setup.eyes[0]
     if first == 0:
-        place(s, p, start[0], start[1], start[2])
+        place(s, p, setup.start[0], setup.start[1], setup.start[2])
     for n in range(first, last):
-        look(n, s, p, c.dt, floor, e)
-        advance(n, s, left_duty, right_duty, p, c, commands, engine, buffer, count)
-    look(last, s, p, c.dt, floor, e)
+        look(n, s, p, c.dt, setup.floor, e)
+        advance(n, s, left_duty, right_duty, p, c, setup.commands, setup.engine)
+    look(last, s, p, c.dt, setup.floor, e)
