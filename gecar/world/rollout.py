@@ -302,47 +302,31 @@ class Fleet:
         """
         which = np.asarray(pairs, np.int64).reshape(-1, 2)
         seeds = np.asarray(streams, np.uint64)
-        make = self._one_by_one if self.world.uses_pymunk else self._in_lanes
-        ends = make(programs, under, which, seeds)
+        rows = np.concatenate([np.zeros((0, N_COLUMNS), np.int32), *programs])
+        first_row = np.cumsum([0, *map(len, programs)]).astype(np.int64)
+        used = np.array([sensors_used(opcodes) for opcodes in programs]).reshape(-1, 3)
+        jobs = Jobs(rows, first_row, used, which[:, 0].copy(), which[:, 1].copy(), seeds)
+        n = len(which)
+        arrival = np.full((n, len(self.floor.sequence)), np.nan)
+        ends = Ends(np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros(n, np.int32), arrival)
+        if self.world.uses_pymunk:
+            self._drive_one_by_one(jobs, under, ends)
+        else:
+            drive_lanes(jobs, under, self.floor, self._memory, ends)
         summary = np.zeros(len(which), SUMMARY)
         summary["outcome"], summary["steps"] = ends.outcome, ends.steps
         summary["time_s"] = ends.steps * under.derived["dt"][which[:, 1]]
         summary["checkpoints"] = np.minimum(ends.passed, len(self.floor.sequence) - 1)
         return summary, ends.arrival_s
 
-    def _in_lanes(
-        self,
-        programs: Sequence[npt.NDArray[np.int32]],
-        under: Conditions,
-        which: npt.NDArray[np.int64],
-        streams: npt.NDArray[np.uint64],
-    ) -> Ends:
-        rows = np.concatenate([np.zeros((0, N_COLUMNS), np.int32), *programs])
-        first_row = np.cumsum([0, *map(len, programs)]).astype(np.int64)
-        used = np.array([sensors_used(opcodes) for opcodes in programs]).reshape(-1, 3)
-        ends = self._no_ends(len(which))
-        jobs = Jobs(rows, first_row, used, which[:, 0].copy(), which[:, 1].copy(), streams)
-        drive_lanes(jobs, under, self.floor, self._memory, ends)
-        return ends
-
-    def _one_by_one(
-        self,
-        programs: Sequence[npt.NDArray[np.int32]],
-        under: Conditions,
-        which: npt.NDArray[np.int64],
-        streams: npt.NDArray[np.uint64],
-    ) -> Ends:
-        ends = self._no_ends(len(which))
-        drivers = {row: Driver(self.world, select(under, [row])) for row in set(which[:, 1].tolist())}
-        for k, (program, row) in enumerate(which.tolist()):
-            result = drivers[row].simulate(programs[program], int(streams[k]))
+    def _drive_one_by_one(self, jobs: Jobs, under: Conditions, ends: Ends) -> None:
+        """Make all drives, each with an engine of its own; ``ends`` is filled as by `drive_lanes`."""
+        drivers = {row: Driver(self.world, select(under, [row])) for row in set(jobs.condition.tolist())}
+        for k, (program, row) in enumerate(zip(jobs.program, jobs.condition.tolist(), strict=True)):
+            opcodes = jobs.rows[jobs.first_row[program] : jobs.first_row[program + 1]]
+            result = drivers[row].simulate(opcodes, int(jobs.stream[k]))
             ends.outcome[k], ends.steps[k], ends.arrival_s[k] = result.outcome, result.steps, result.arrival_s
             ends.passed[k] = np.count_nonzero(~np.isnan(result.arrival_s))
-        return ends
-
-    def _no_ends(self, n: int) -> Ends:
-        arrival = np.full((n, len(self.floor.sequence)), np.nan)
-        return Ends(np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros(n, np.int32), arrival)
 
 
 def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
