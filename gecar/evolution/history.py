@@ -19,8 +19,8 @@ class Generation(NamedTuple):
     generation
         0 is the first population.
     best, mean
-        Fitness of eq. 1 over the population [s], or with drawn conditions the median time to GOAL of what arrives often
-        enough; 10^4 is a program that fails.
+        Merit over the population, see `gecar.evolution.scores.FIELDS`; 10^4 is a program that fails. Of robot programs
+        it is fitness of eq. 1 [s], or with drawn conditions the median time to GOAL of what arrives often enough.
     valid, distinct
         Shares of the population that map to a program, and of different programs in it.
     evaluations
@@ -28,13 +28,13 @@ class Generation(NamedTuple):
     wall_s
         Time since the run began, interruptions apart [s].
     solved
-        Share of the population that reaches GOAL, often enough where there are drawn conditions.
+        Share of the population that does not fail.
     mean_solved
-        Their mean time to GOAL [s]; nan where there is none.
+        Their mean merit; nan where there is none.
     simulated
-        Programs simulated since the run began: evaluations that no earlier one answered.
+        Programs scored since the run began: evaluations that no earlier one answered.
     steps
-        Simulation steps since the run began.
+        What scoring cost since the run began; of robot programs, simulation steps.
     """
 
     generation: int
@@ -99,7 +99,7 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
 
 
 class Patience:
-    """Says when a population has come to its end: at GOAL, and for so many generations no faster.
+    """Says when a population has come to its end: it holds a success, and for so many generations no better one.
 
     Parameters
     ----------
@@ -109,20 +109,20 @@ class Patience:
 
     def __init__(self, generations: int) -> None:
         self._limit = generations
-        self._best_s, self._idle = UNSOLVED, 0
+        self._best, self._idle = UNSOLVED, 0
 
     @property
     def at_its_end(self) -> bool:
         """Whether the next generation is to be a new population."""
         return 0 < self._limit <= self._idle
 
-    def see(self, best_s: float) -> None:
-        """Take the best fitness of a generation [s]; after an end it is that of a new population."""
+    def see(self, best: float) -> None:
+        """Take the best merit of a generation; after an end it is that of a new population."""
         if self.at_its_end:
-            self._best_s, self._idle = UNSOLVED, 0
-        if best_s < self._best_s:
-            self._best_s, self._idle = best_s, 0
-        elif self._best_s < UNSOLVED:
+            self._best, self._idle = UNSOLVED, 0
+        if best < self._best:
+            self._best, self._idle = best, 0
+        elif self._best < UNSOLVED:
             self._idle += 1
 
 

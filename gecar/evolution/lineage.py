@@ -27,7 +27,7 @@ INDIVIDUAL = np.dtype(
     [("parent", "<i4"), ("mate", "<i4"), ("merit", "<f4"), ("changed", "u1"), ("codons", "<i4")]
 )
 """``parent``, ``mate``: places in the generation before, as in `gecar.evolution.breeding.Bred`. ``merit``: time to GOAL
-[s], or 10^4 to 10^4 + 2, see `gecar.search.fitness.merit`. ``changed``: what made its program another than its
+[s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: what made its program another than its
 parent's, `CROSSOVER` | `MUTATION` | `CREEP`. ``codons``: how many are kept of it; none if nothing changed it."""
 
 MAX_BYTES = 32_000_000

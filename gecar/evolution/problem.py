@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from gecar.language.mapping import Mapped
 P = TypeVar("P")
 
 
-class Problem(Generic[P]):
+class Problem(ABC, Generic[P]):
     """What an evolution must know of its programs; `read` and `meaning` are for subclasses to say."""
 
     @property
@@ -38,13 +39,13 @@ class Problem(Generic[P]):
         """How many cases `cases` tells apart, for ``lexicase``; 0 where there are none."""
         return 0
 
+    @abstractmethod
     def read(self, mapped: Mapped, i: int) -> P | None:
         """Return genome i's program; None where its derivation is none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def meaning(self, program: P) -> bytes:
         """Return bytes that are equal for programs that do the same: they share their scores."""
-        raise NotImplementedError
 
     def seed(self, program: P, seed: int) -> int:
         """Return the seed of a program's noise: its own, and the same whenever a run with this seed meets it."""
