@@ -47,7 +47,9 @@ class Mortal:
 
     mark: Path
 
-    def __call__(self, programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat_s: float) -> Scores:
+    def __call__(
+        self, programs: Sequence[Opcodes], _seeds: Sequence[int], _to_beat: float, _generation: int
+    ) -> Scores:
         if programs and not self.mark.exists():
             self.mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
