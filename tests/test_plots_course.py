@@ -63,4 +63,4 @@ def test_a_scan_is_shown(tmp_path):
 
 
 def test_the_description_names_the_lower_bound():
-    assert "no program is faster than 11.85 s" in describe(load_course("paper"), load_robot("ev3"))
+    assert "lower bound 11.85 s if tyres hold" in describe(load_course("paper"), load_robot("ev3"))

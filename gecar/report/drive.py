@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gecar.world.course.course import Course
+from gecar.world.course.lower_bound.fastest_time import bound_words
 from gecar.world.course.reference_times import reference_s
 from gecar.world.rollout import Drive, Outcome, World
 
@@ -78,7 +79,7 @@ def detail_of(world: World, drive: Drive) -> str:
     course = world.course
     parts = [
         f"{drive.checkpoints} of {len(course.sequence) - 1} checkpoints",
-        f"no program is faster than {course.lower_bound_s(world.robot):.2f} s",
+        bound_words(course.lower_bound_s(world.robot)),
         f"robot {world.robot.name}",
         f"step {1000 * world.step_s:g} ms",
     ]

@@ -66,13 +66,14 @@ def show(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a course's tiles and what no program can beat on it; draw it if asked.
+    """Show a course's tiles, its size and the lower bound on the time to GOAL; draw it if asked.
 
     [bold]Example[/]
 
       gecar course show hairpin --picture hairpin.png
     """
     from gecar.world.course.course import load_course
+    from gecar.world.course.lower_bound.fastest_time import bound_words
     from gecar.world.robot import load_robot
 
     output = Output(as_json)
@@ -89,9 +90,10 @@ def show(
     output.print(
         f"{each['width_m']:g} x {each['height_m']:g} m, {each['checkpoints']} checkpoints, "
         f"line {each['line_m']:.2f} m, shortest way {each['shortest_way_m']:.2f} m; "
-        f"no program is faster than {each['lower_bound_s']:.2f} s"
+        + bound_words(each["lower_bound_s"])
+        + " (not proven where they slide)"
         + (
-            f", the fastest drive an optimiser found takes {each['reference_s']:.2f} s."
+            f"; the fastest drive an optimiser found takes {each['reference_s']:.2f} s."
             if each["reference_s"]
             else "."
         )

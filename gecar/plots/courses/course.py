@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from gecar.plots.courses.robot import RobotArtist, placed, shape_of
 from gecar.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, PAPER, SOFT, headline, look, new_figure
 from gecar.world.course.course import Course, Obstacle
+from gecar.world.course.lower_bound.fastest_time import bound_words
 from gecar.world.course.tiles import Side
 from gecar.world.robot import Robot
 
@@ -72,7 +73,7 @@ def course_figure(course: Course, robot: Robot | None = None) -> Figure:
 
 
 def describe(course: Course, robot: Robot | None = None) -> str:
-    """Say in a line what a course is like, and with a robot, the time no program can beat."""
+    """Say in a line what a course is like, and with a robot, the lower bound on its time to GOAL."""
     words = [
         f"{course.width_m:g} × {course.height_m:g} m",
         f"{len(course.checkpoints)} checkpoints",
@@ -80,8 +81,8 @@ def describe(course: Course, robot: Robot | None = None) -> str:
         f"shortest way {course.shortest.length_m:.2f} m" + (" (dashed)" if robot else ""),
     ]
     if robot is not None:
-        words.append(f"no program is faster than {course.lower_bound_s(robot):.2f} s")
-    return "   ·   ".join(words)
+        words.append(bound_words(course.lower_bound_s(robot)))
+    return " · ".join(words)
 
 
 def outline_patch(shape: BaseGeometry, **style: Any) -> PathPatch:

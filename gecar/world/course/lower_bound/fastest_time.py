@@ -118,6 +118,11 @@ def _holding(p: np.void, tilt: float) -> float:
     return GRAVITY * (grip * share / (1.0 + grip * p["com_height"] / abs(p["caster_ahead"])) - 2.0 * tilt)
 
 
+def bound_words(bound_s: float) -> str:
+    """Write a lower bound [s], and for what it is proven."""
+    return f"lower bound {bound_s:.2f} s if tyres hold"
+
+
 def travelled(fast: Sprint, time_s: float) -> float:
     """Return how far [m] the outer wheel can be after a time from the start."""
     t = max(time_s - fast.dead_s, 0.0)
