@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Generic
 
 import numpy as np
@@ -283,11 +284,9 @@ class Evolution(Generic[P]):
         """Keep the best programs so far, with what is known of them now."""
         for i, phenotype in enumerate(bred.phenotypes):
             if phenotype is not None and self.scores["merit"][i] < UNSOLVED:
-                known = self._contenders.get(phenotype.digest)
-                generation = known.generation if known else self.generation
-                score = self.scores[i : i + 1].copy()
-                genome = bred.genomes[i].copy()
-                self._contenders[phenotype.digest] = Best(genome, score, generation, phenotype.program)
+                score, known = self.scores[i : i + 1].copy(), self._contenders.get(phenotype.digest)
+                found = known or Best(bred.genomes[i].copy(), score, self.generation, phenotype.program)
+                self._contenders[phenotype.digest] = replace(found, score=score)
             elif phenotype is not None:
                 self._contenders.pop(phenotype.digest, None)
         ranked = sorted(self._contenders, key=lambda digest: _rank(self._contenders[digest].score[0]))

@@ -209,6 +209,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
         raise
     saver.save()
     choose(task, evolution)
+    folder.save(evolution.state(), task.configuration)  # who came from whom is asked of the program chosen
     folder.write_reports(evolution)
     return folder.write_result(evolution, measured(task, evolution))
 
