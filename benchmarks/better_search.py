@@ -20,6 +20,7 @@ import numpy.typing as npt
 from benchmarks.studies import add_seeds, performed, planned, seeds_of
 from gecar.files import write_whole
 from gecar.report.table import piped, seconds
+from gecar.results.arrival import percent
 from gecar.results.cells import Cell
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.search.settings import PRESETS
@@ -34,6 +35,7 @@ PONYGE2 = {
 """PonyGE2's defaults (Fenton et al. 2017) with this project's operators; its position-independent grow becomes PTC2."""
 _CHANGED = {name: value for name, value in PRESETS["better"] if getattr(PRESETS["paper"], name) != value}
 _SIZES = {"population", "generations"}
+_HEADS = ("at GOAL", "median [s] (95 %)", "arrive", "worst [s]")
 
 
 def searches() -> dict[str, dict[str, Any]]:
@@ -74,7 +76,7 @@ def ablation_table(cells: Sequence[Cell]) -> str:
     lines = [[REFERENCE, *_figures(better), "", ""]]
     for cell, test, p in zip(others, tests, corrected, strict=True):
         lines.append([cell.column, *_figures(cell), f"{test.a12:.2f}", f"{p:.2g}"])
-    heads = ["search", "at GOAL", "median [s] (95 %)", "worst [s]", "evaluations to 16.74 s", "A12", "p"]
+    heads = ["search", *_HEADS, "evaluations to 16.74 s", "A12", "p"]
     return piped([heads, *lines])
 
 
@@ -83,11 +85,21 @@ def courses_table(cells: Sequence[Cell]) -> str:
     pairs = list(zip(cells[::2], cells[1::2], strict=True))
     tests = [contrast(better, paper) for better, paper in pairs]
     corrected = holm([test.p for test in tests])
-    heads = ["course", "better: at GOAL", "median [s] (95 %)", "worst [s]"]
-    lines = [[*heads, "paper: at GOAL", "median [s] (95 %)", "worst [s]", "A12", "p"]]
+    heads = [
+        f"{search}: {head}" if head == _HEADS[0] else head
+        for search in ("better", "paper")
+        for head in _HEADS
+    ]
+    lines = [["course", *heads, "A12", "p"]]
     for (better, paper), test, p in zip(pairs, tests, corrected, strict=True):
         lines.append(
-            [str(better.row), *_figures(better)[:3], *_figures(paper)[:3], f"{test.a12:.2f}", f"{p:.2g}"]
+            [
+                str(better.row),
+                *_figures(better)[: len(_HEADS)],
+                *_figures(paper)[: len(_HEADS)],
+                f"{test.a12:.2f}",
+                f"{p:.2g}",
+            ]
         )
     return piped(lines)
 
@@ -98,6 +110,7 @@ def _figures(cell: Cell) -> list[str]:
     return [
         f"{cell.solved}/{len(times)}",
         f"{seconds(cell.quantile_s(0.5))} ({seconds(low)} to {seconds(high)})",
+        percent(cell.share),
         seconds(float(times.max())),
         _count(evaluations_to(cell, PAPERS_BEST_S)),
     ]

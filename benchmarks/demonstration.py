@@ -24,6 +24,7 @@ from benchmarks.concealed.recording import Conditions
 from gecar.files import write_whole
 from gecar.language.program import read_program
 from gecar.report.table import piped
+from gecar.results.arrival import percent, share_of
 
 TRIALS = 5
 SEEDS = 5
@@ -81,6 +82,7 @@ def row(what: str, compared: dict[str, Any]) -> list[str]:
     return [
         what,
         f"{simulated:.2f}",
+        percent(share_of(compared["simulation"])),
         f"{arrival:.2f}",
         f"{100 * (arrival / simulated - 1):+.1f} %",
         f"{x:.3f}",
@@ -102,7 +104,15 @@ def main() -> None:
     after = gecar("compare", *only, "--program", run, "--robot", corrected, "--out", out / "after")
     again, its_trials, failed_again = fastest_that_arrives(out, "corrected", "--robot", corrected)
     new = gecar("compare", its_trials, "--program", again, "--robot", corrected, "--out", out / "again")
-    heads = ["program, simulated robot", "simulated [s]", "driven [s]", "late", "correlation x", "y"]
+    heads = [
+        "program, simulated robot",
+        "simulated [s]",
+        "arrive",
+        "driven [s]",
+        "late",
+        "correlation x",
+        "y",
+    ]
     lines = [
         row("first, nominal", before),
         row("first, corrected", after),

@@ -12,7 +12,7 @@ from gecar.evolution.scores import UNSOLVED
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.language.program import parse_program
-from gecar.results.run import arrives
+from gecar.results.arrival import arrives
 from gecar.search.batches import Batches
 from gecar.search.chance import (
     MARGIN,

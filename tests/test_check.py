@@ -27,7 +27,7 @@ def test_a_new_table_is_filled_and_then_holds(gecar, table):
     assert gecar("check", table, "--workers", 1).code == 1
     ended = gecar("check", table, "--update", "--workers", 1)
     assert ended.code == 0
-    assert "5 moved" in ended.out
+    assert "7 moved, 2 within what is allowed" in ended.out
     again = gecar("check", table, "--workers", 1, "--json")
     assert (again.code, again.json["moved"], again.json["passed"]) == (0, [], True)
 
@@ -49,6 +49,7 @@ def test_pins_are_the_versions_of_the_table(gecar):
 def test_other_versions_excuse_small_moves_and_no_large_ones():
     drive = {"program": "motor(1,1,1)", "outcome": "goal", "time_s": 10.0, "checkpoints": 18}
     search = {"seeds": [1, 2, 3], "fitness_s": [15.0, 16.0, 17.0], "simulated": [5, 5, 5]}
+    drive["arrives_share"], search["arrives_share"] = 0.9, [0.9, 0.2, 0.95]
     before = FitnessTable({"numba": "1"}, (drive,), (search,))
     for scale, matters in ((1.005, False), (1.2, True)):
         times = [time * scale for time in search["fitness_s"]]
@@ -57,6 +58,29 @@ def test_other_versions_excuse_small_moves_and_no_large_ones():
         )
         assert [move.matters for move in moves(before, now)] == [matters] * 2
         assert all(move.matters for move in moves(before, replace(now, versions={"numba": "1"})))
+
+
+def test_shares_are_guarded_and_a_table_from_before_them_still_holds(gecar, table):
+    gecar("check", table, "--update", "--workers", 1)
+    filled = table.read_text()
+    table.write_text(
+        "".join(line for line in filled.splitlines(True) if not line.startswith("arrives_share"))
+    )
+    older = gecar("check", table, "--workers", 1, "--json")
+    assert older.code == 0
+    assert [move["figure"] for move in older.json["moved"]] == ["arrives_share"] * 2
+    table.write_text(filled.replace("arrives_share = 0.0", "arrives_share = 0.5"))
+    assert gecar("check", table, "--workers", 1).code == 1
+
+
+@pytest.mark.parametrize(("share", "matters"), [(0.85, False), (0.7, True)])
+def test_other_versions_may_move_a_share_a_little(share, matters):
+    row = {"program": "motor(1,1,1)", "outcome": "goal", "time_s": 10.0, "checkpoints": 18}
+    before, now = (
+        FitnessTable({"numba": version}, ({**row, "arrives_share": each},), ())
+        for version, each in (("1", 0.9), ("2", share))
+    )
+    assert [(move.figure, move.matters) for move in moves(before, now)] == [("arrives_share", matters)]
 
 
 def test_the_shipped_table_reads_back_as_it_was_written(tmp_path):

@@ -10,6 +10,7 @@ from gecar.plots.reality.gap import gap_figure
 from gecar.plots.style import is_whole
 from gecar.reality.compare.gap import Path, arrival_of, gap, nrmse, recorded_path
 from gecar.report.gap import gap_csv, gap_markdown, mean_and_spread, spread
+from gecar.results.arrival import percent
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
@@ -113,7 +114,9 @@ def test_compare_writes_tables_and_a_picture(gecar, tmp_path):
     assert ended.code == 0
     assert ended.json["simulation"]["outcome"] == "goal"
     assert [t["trial"] for t in ended.json["trials"]] == ["trial_1", "trial_2"]
-    assert "Arrival time at simulation" in ended.err
+    told = ended.json["simulation"]["arrives"]
+    assert told["of"] == 200
+    assert f" s, {percent(told['share'])} arrive." in ended.err
     assert (tmp_path / "gap/compare.md").read_text().startswith("# Simulation and recordings")
     with Image.open(tmp_path / "gap/compare.png") as picture:
         assert min(picture.size) > 800

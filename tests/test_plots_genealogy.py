@@ -46,38 +46,48 @@ def program_of(lineage):
     return lambda member: MAPPER.map(lineage.codons_of(member)[None]).program(0)
 
 
+def half(_member):
+    return 0.5
+
+
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_a_genealogy_is_within_its_edges(n):
     lineage = kept(VARIED, n)
     winner = (n - 1, int(lineage.generations[-1]["merit"].argmin()))
-    assert is_whole(genealogy(lineage, winner, program_of(lineage), "A title", "a detail"))
+    assert is_whole(genealogy(lineage, winner, program_of(lineage), half, "A title", "a detail"))
 
 
 def test_a_long_genealogy_lists_the_latest_steps(monkeypatch):
     monkeypatch.setattr("gecar.plots.runs.genealogy.MAX_STEPS", 3)
     lineage = kept(VARIED, 7)
-    most = max(
-        ((6, k) for k in range(20)), key=lambda member: len(steps_of(lineage, member, program_of(lineage)))
-    )
-    steps = steps_of(lineage, most, program_of(lineage))
-    words = [text.get_text() for text in genealogy(lineage, most, program_of(lineage)).axes[1].texts]
+    program = program_of(lineage)
+    most = max(((6, k) for k in range(20)), key=lambda member: len(steps_of(lineage, member, program, half)))
+    steps = steps_of(lineage, most, program, half)
+    assert steps_of(lineage, most, program, half, 3) == steps[-3:]
+    words = [text.get_text() for text in genealogy(lineage, most, program, half).axes[1].texts]
     assert any(f"({len(steps) - 3} earlier steps are not shown)" in text for text in words)
     assert str(steps[-1].generation) in words
 
 
 def test_each_step_shows_what_is_new():
     lineage = kept(VARIED, 7)
-    steps = steps_of(lineage, (6, 4), program_of(lineage))
+    steps = steps_of(lineage, (6, 4), program_of(lineage), half)
     assert "".join(text for text, _ in steps[-1].words).startswith(("if(", "motor("))
     assert steps[0].by == "first population"
     assert all(any(fresh for _, fresh in step.words) for step in steps[1:] if step.by == "creep")
 
 
 @pytest.mark.parametrize(
-    ("merit", "words"), [(15.7, "15.70 s"), (10_000.6, "40 % of the way"), (10_002.0, "no program")]
+    ("merit", "share", "words"),
+    [
+        (15.7, 0.985, "15.70 s, 98.5 % arrive"),
+        (15.7, None, "15.70 s, - % arrive"),
+        (10_000.6, 0.0, "40 % of the way"),
+        (10_002.0, None, "no program"),
+    ],
 )
-def test_fitness_in_words(merit, words):
-    assert fitness_words(merit) == words
+def test_fitness_in_words(merit, share, words):
+    assert fitness_words(merit, share) == words
 
 
 def test_the_winner_is_the_program_that_the_run_reports(finished):

@@ -164,8 +164,8 @@ def test_the_table_stands_beside_the_papers():
     runs = paper.plan()
     cells = cells_of(runs, [record(run, 15.0) for run in runs])
     text = markdown(paper, cells, paper_figures(paper, runs), "about")
-    assert "| 0.5 | 15.00 (22.32) | 15.00 (16.74) | 15.00 (17.20) |" in text
-    assert "| 0.4 | 15.00 (-) | 15.00 (-) | 15.00 (22.51) |" in text
+    assert "| 0.5 | 15.00, - % (22.32) | 15.00, - % (16.74) | 15.00, - % (17.20) |" in text
+    assert "| 0.4 | 15.00, - % (-) | 15.00, - % (-) | 15.00, - % (22.51) |" in text
     rows = csv_text(paper, cells, PAPER_TABLE_5).splitlines()
     assert len(rows) == 10
     assert rows[0].endswith("paper_s")

@@ -91,8 +91,10 @@ def headline(figure: Figure, title: str, detail: str = "") -> None:
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label a logarithmic axis 0.1, 0.2, 0.5, 1 and so on, and nothing between."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+    """Label a logarithmic axis of what is drawn 0.1, 0.2, 0.5, 1 and so on; over more than 2.5 decades 0.1, 1, 10."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 

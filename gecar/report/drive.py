@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gecar.results.arrival import percent, with_share
 from gecar.world.course.course import Course
 from gecar.world.course.lower_bound.fastest_time import bound_words
 from gecar.world.course.reference_times import reference_s
@@ -16,12 +17,10 @@ PAPER_BEST_S = 16.74
 """Time to GOAL of the paper's best program on its course (Tables 5 and 6) [s]."""
 
 
-def title_of(drive: Drive, course: Course) -> str:
-    """Say in a few words what came of a drive."""
-    where = course.title or course.name
-    if drive.outcome == Outcome.GOAL:
-        return f"{where}: GOAL in {drive.time_s:.2f} s"
-    return f"{where}: {drive.outcome.sentence} after {drive.time_s:.2f} s"
+def title_of(drive: Drive, course: Course, share: float | None) -> str:
+    """Say in a few words what came of a drive, and in which share of drives its program arrives."""
+    came = "GOAL in" if drive.outcome == Outcome.GOAL else f"{drive.outcome.sentence} after"
+    return f"{course.title or course.name}: {came} {with_share(drive.time_s, share)}"
 
 
 def sentence_of(drive: Drive) -> str:
@@ -35,7 +34,7 @@ def arrival_of(arrives: Mapping[str, Any]) -> str:
     """Say in a sentence or two how a program arrives under fresh conditions and at other steps, from result.json."""
     if not arrives["of"]:
         return "There is no program to drive under other conditions."
-    words = f"Of {arrives['of']} drives under fresh conditions {arrives['share']:.1%} arrive"
+    words = f"Of {arrives['of']} drives under fresh conditions {percent(arrives['share'])} arrive"
     if arrives["median_s"] is not None:
         words += f", in {arrives['median_s']:.2f} s (median; 95 % of these within {arrives['p95_s']:.2f} s)"
     return f"{words}. {_steps_of(arrives['steps'])}"
@@ -47,11 +46,6 @@ def _steps_of(times: Mapping[str, float | None]) -> str:
     if missed:
         return f"Simulated at a step of {', '.join(missed)} ms it does not arrive."
     return f"Simulated at steps of 4 to 0.25 ms it arrives in {min(arrived):.2f} to {max(arrived):.2f} s."
-
-
-def short_arrival(arrives: Mapping[str, Any] | None) -> str:
-    """Say in few words which share of drives under fresh conditions arrives; empty for results that do not know."""
-    return f"arrives in {arrives['share']:.0%} of {arrives['of']} drives" if arrives and arrives["of"] else ""
 
 
 def standing_of(world: World, drive: Drive) -> str:

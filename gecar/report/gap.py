@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gecar.reality.compare.gap import CHANNELS, Gap, Trial
+from gecar.results.arrival import with_share
 from gecar.world.rollout import Outcome
 
 
@@ -41,11 +42,11 @@ def gap_lines(found: Gap) -> list[str]:
 
 
 def _simulated(found: Gap) -> str:
-    if found.outcome is None:
+    if found.outcome is None or found.simulated_s is None:
         return "No program: the recorded commands, replayed open loop, stand for the simulation."
     if found.outcome == Outcome.GOAL:
-        return f"Arrival time at simulation: {found.simulated_s:.2f} s."
-    return f"In simulation the robot {found.outcome.sentence} after {found.simulated_s:.2f} s."
+        return f"Arrival time at simulation: {with_share(found.simulated_s, found.share)}."
+    return f"In simulation the robot {found.outcome.sentence} after {with_share(found.simulated_s, found.share)}."
 
 
 def gap_title(found: Gap) -> str:
@@ -154,6 +155,7 @@ def gap_table(found: Gap) -> dict[str, Any]:
             "arrival_s": found.simulated_s if found.outcome == Outcome.GOAL else None,
             "time_s": found.simulated_s,
             "outcome": found.outcome.name.lower() if found.outcome else "replay",
+            "arrives": found.arrives,
         },
         "trials": gap_rows(found),
         "spread": spread(found),

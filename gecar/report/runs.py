@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from gecar.report.drive import short_arrival
+from gecar.results.arrival import median_share, percent, share_of, with_share
 from gecar.results.config import Config
 from gecar.world.course.course import load_course
 
@@ -61,19 +61,28 @@ def _summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "median_s": float(np.quantile(times, 0.5, method="higher")),
         "worst_s": float(times.max()),
         "mean_solved_s": float(solved.mean()) if len(solved) else float("nan"),
+        "arrives_share": median_share(results),
         "evaluations": int(np.median([result["evaluations"] for result in results])),
     }
 
 
+def came_to(group: Mapping[str, Any]) -> str:
+    """Say in few words what a group of runs came to, in the median; nothing where that did not reach GOAL."""
+    return with_share(group["median_s"], group["arrives_share"]) if np.isfinite(group["median_s"]) else ""
+
+
 def summary_table(groups: Mapping[str, Mapping[str, Any]]) -> Table:
     """Return groups of runs as a table for people."""
-    table = Table("", "runs", "solved", "best", "median", "worst", "evaluations", box=None, pad_edge=False)
+    table = Table(
+        "", "runs", "solved", "best", "median", "worst", "arrive", "evaluations", box=None, pad_edge=False
+    )
     for name, group in groups.items():
         times = (
             f"{group[key]:.2f} s" if np.isfinite(group[key]) else "no GOAL"
             for key in ("best_s", "median_s", "worst_s")
         )
-        table.add_row(name, str(group["runs"]), str(group["solved"]), *times, f"{group['evaluations']:,}")
+        counts = str(group["runs"]), str(group["solved"])
+        table.add_row(name, *counts, *times, percent(group["arrives_share"]), f"{group['evaluations']:,}")
     return table
 
 
@@ -82,8 +91,7 @@ def run_title(config: Config, result: Mapping[str, Any]) -> str:
     course = load_course(config.course)
     where = course.title or course.name
     if result["solved"]:
-        words = f"{where}: GOAL in {result['fitness_s']:.2f} s after {result['generations']} generations"
-        return ", ".join(filter(None, [words, short_arrival(result.get("arrives"))]))
+        return f"{where}: GOAL in {with_share(result['fitness_s'], share_of(result))}"
     return f"{where}: no program at GOAL after {result['generations']} generations"
 
 

@@ -8,8 +8,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table
 
+from gecar.results.arrival import percent, share_of
 from gecar.results.cells import Cell, difference_p
 from gecar.results.statistics import contrast, holm
 from gecar.results.study import TABLE_5, Planned, Study
@@ -22,8 +24,12 @@ PAPER_TABLE_5: Mapping[tuple[float, float], float] = {
 """Mean of the best in the last generation over five runs by crossover and mutation rate [s]; inf: did not converge."""
 
 _HEADINGS = (
-    "runs", "at GOAL", "mean [s]", "median [s]", "best to worst [s]", "sd [s]", "evaluations", "simulated",
+    "runs", "at GOAL", "mean [s]", "median [s]", "best to worst [s]", "arrive", "sd [s]", "evaluations", "simulated",
 )  # fmt: skip
+ARRIVE = (
+    "the share of drives under fresh conditions in which a run's best program arrives (median over the runs)"
+)
+"""What a table's shares are."""
 _RUN_COLUMNS = (
     "fitness_s", "solved", "found_in_generation", "evaluations", "distinct_evaluations", "simulated_steps", "wall_s",
 )  # fmt: skip
@@ -43,7 +49,7 @@ def of_paper(cell: Cell, paper: Mapping[tuple[float, float], float]) -> float | 
 
 def terminal_table(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> Table:
     """Return the table for people."""
-    table = Table(*_heads(study, paper), box=None, pad_edge=False, header_style="bold")
+    table = Table(*map(escape, _heads(study, paper)), box=None, pad_edge=False, header_style="bold")
     for column in table.columns[2:]:
         column.justify = "right"
     for cell in cells:
@@ -111,10 +117,10 @@ def runs_csv(study: Study, cells: Sequence[Cell]) -> str:
     """Write a row for each run as CSV."""
     stream = io.StringIO()
     out = csv.writer(stream, lineterminator="\n")
-    out.writerow([study.rows.name, study.columns.name, "seed", *_RUN_COLUMNS, "program"])
+    out.writerow([study.rows.name, study.columns.name, "seed", *_RUN_COLUMNS, "arrives_share", "program"])
     for cell in cells:
         for record in cell.records:
-            figures = [_csv(record[name]) for name in _RUN_COLUMNS]
+            figures = [_csv(value) for value in (*(record[name] for name in _RUN_COLUMNS), share_of(record))]
             out.writerow([cell.row, cell.column, record["seed"], *figures, record["program"]])
     return stream.getvalue()
 
@@ -171,6 +177,7 @@ def _words(cell: Cell, paper: Mapping[tuple[float, float], float]) -> list[str]:
         seconds(figures["mean_s"]),
         seconds(figures["median_s"]),
         spread,
+        percent(figures["arrives_share"]),
     ]
     words += [
         seconds(figures["sd_solved_s"]),
@@ -191,15 +198,18 @@ def _matrix(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, flo
         for column in study.columns.values:
             cell = by_place[str(row), str(column)]
             value = of_paper(cell, paper)
-            shown.append(seconds(cell.mean_s) + (f" ({seconds(value)})" if value is not None else ""))
+            words = f"{seconds(cell.mean_s)}, {percent(cell.share)}"
+            shown.append(words + (f" ({seconds(value)})" if value is not None else ""))
         lines.append(shown)
-    note = "Mean of the best time to GOAL over the seeds [s]; a dash where a run did not get there"
-    return piped(lines) + f"\n\n{note}{'; in brackets the paper' if paper else ''}."
+    note = "Mean of the best time to GOAL over the seeds [s], a dash where a run did not get there, and "
+    note += f"{ARRIVE}{'; in brackets the paper' if paper else ''}."
+    return f"{piped(lines)}\n\n{note}"
 
 
 def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
     note = (
-        "A run without GOAL counts as slower than any in mean, median and worst; sd is of the runs at GOAL. "
+        f"A run without GOAL counts as slower than any in mean, median and worst; arrive is {ARRIVE}; "
+        "sd is of the runs at GOAL. "
         "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
     )
     return piped([_heads(study, paper), *(_words(cell, paper) for cell in cells)]) + f"\n\n{note}"

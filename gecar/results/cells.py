@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from gecar.evolution.scores import UNSOLVED
+from gecar.results.arrival import median_share
 from gecar.results.study import Planned
 
 Floats = npt.NDArray[np.float64]
@@ -49,6 +50,11 @@ class Cell:
         return float(self.times_s.mean()) if self.records else float("nan")
 
     @property
+    def share(self) -> float:
+        """Share of drives in which a run's best program arrives, 0..1, median; nan where a run does not say."""
+        return median_share(self.records)
+
+    @property
     def bests_s(self) -> Floats:
         """Best fitness of each run so far by generation [s], shape (runs, generations + 1)."""
         bests = np.array([record["history"]["best"] for record in self.records], float)
@@ -82,6 +88,7 @@ class Cell:
             "simulated": self._median("distinct_evaluations"),
             "simulated_steps": self._median("simulated_steps"),
             "wall_s": self._median("wall_s"),
+            "arrives_share": self.share,
         }
 
     def _median(self, name: str) -> float:

@@ -2,8 +2,8 @@
 
 With the versions the table names, every figure must come out equal: all arithmetic is IEEE in a fixed order, and all
 randomness is gecar's own. With others, a last bit may differ, and what follows it: drives may then move by
-`DRIVE_TOLERANCE_PCT`, a search's median over its seeds by `SEARCH_TOLERANCE_PCT`, and one of its seeds may gain or
-lose GOAL.
+`DRIVE_TOLERANCE_PCT`, a search's median over its seeds by `SEARCH_TOLERANCE_PCT`, one of its seeds may gain or lose
+GOAL, and a share of drives that arrive (of searches the median) may move by `SHARE_TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from gecar.errors import expected
 from gecar.files import read_toml, write_whole
 from gecar.language.program import parse_program
+from gecar.results.arrival import share_of, shares
 from gecar.results.config import Config, configure
 from gecar.results.provenance import versions
 from gecar.results.run import load_task
@@ -29,8 +30,9 @@ from gecar.world.rollout import simulate
 PINNED = ("numba", "numpy", "pymunk", "scipy", "shapely")
 DRIVE_TOLERANCE_PCT = 1.0
 SEARCH_TOLERANCE_PCT = 15.0
-DRIVE_FIGURES = ("outcome", "time_s", "checkpoints")
-SEARCH_FIGURES = ("fitness_s", "simulated")
+SHARE, SHARE_TOLERANCE = "arrives_share", 0.1
+DRIVE_FIGURES = ("outcome", "time_s", "checkpoints", SHARE)
+SEARCH_FIGURES = ("fitness_s", SHARE, "simulated")
 _SAME_S = 1e-9
 
 Row = Mapping[str, Any]
@@ -45,9 +47,11 @@ class FitnessTable:
     versions
         Of the libraries that computed the figures.
     drives
-        A program each, and fields of `gecar.results.config.Config`; then outcome, time_s and checkpoints.
+        A program each, and fields of `gecar.results.config.Config`; then outcome, time_s, checkpoints and
+        arrives_share (of drives under fresh conditions, 0..1).
     searches
-        Seeds each, and fields of `Config`; then fitness_s [s] and simulated (programs), a figure for each seed.
+        Seeds each, and fields of `Config`; then fitness_s [s], arrives_share and simulated (programs), a figure for
+        each seed.
     """
 
     versions: Mapping[str, str]
@@ -155,7 +159,7 @@ def moves(before: FitnessTable, now: FitnessTable) -> list[Move]:
     found = [
         Move(row, figure, was, is_, matters=True) for row, figure, was, is_ in rows if not _same(was, is_)
     ]
-    return [replace(move, matters=exact or _matters(move)) for move in found]
+    return [replace(move, matters=_matters(move, exact)) for move in found]
 
 
 def other_versions(before: FitnessTable, now: FitnessTable) -> list[str]:
@@ -200,16 +204,19 @@ _HEAD = """\
 # What `gecar check` runs again and compares; `gecar check --update` writes the figures anew.
 # Add rows of your own, without figures: any field of a run's config.toml, a program (drive) or seeds (search).
 # With the versions below all figures must be equal. With others a drive may move by 1 %, a search's median by 15 %,
-# and one of its seeds may gain or lose GOAL. 10000 s: nobody reached GOAL."""
+# one of its seeds may gain or lose GOAL, and a share of drives that arrive (its median) may move by 0.1.
+# 10000 s: nobody reached GOAL."""
 
 
 def _drive(row: Row) -> dict[str, Any]:
-    config = config_of(row)
-    drive = simulate(load_task(config).world, parse_program(row["program"]).opcodes, config.seed)
+    config, program = config_of(row), parse_program(row["program"])
+    world = load_task(config).world
+    drive = simulate(world, program.opcodes, config.seed)
     return {
         "outcome": drive.outcome.name.lower(),
         "time_s": round(drive.time_s, 6),
         "checkpoints": drive.checkpoints,
+        SHARE: shares(world, [program], config.seed)[0],
     }
 
 
@@ -217,6 +224,7 @@ def _searched(row: Row, records: Iterator[Mapping[str, Any]]) -> dict[str, Any]:
     own = [next(records) for _ in row["seeds"]]
     return {
         "fitness_s": [round(record["fitness_s"], 6) for record in own],
+        SHARE: [share_of(record) for record in own],
         "simulated": [record["distinct_evaluations"] for record in own],
     }
 
@@ -236,12 +244,16 @@ def _same(was: Any, now: Any) -> bool:
     return one.shape == other.shape and bool(np.all(np.abs(one - other) <= _SAME_S))
 
 
-def _matters(move: Move) -> bool:
-    """Whether a figure moved by more than other versions excuse."""
-    if move.before is None or isinstance(move.now, str) or move.figure == "checkpoints":
+def _matters(move: Move, exact: bool) -> bool:
+    """Whether a figure moved by more than is allowed: at all with the same versions, else by more than they excuse."""
+    if move.figure == SHARE and move.before is None:
+        return False  # tables written before shares were measured lack them
+    if exact or move.before is None or isinstance(move.now, str) or move.figure == "checkpoints":
         return True
     if move.figure == "time_s":
         return abs(move.percent or 0.0) > DRIVE_TOLERANCE_PCT
+    if move.figure == SHARE:
+        return abs(np.median(move.now) - np.median(move.before)) > SHARE_TOLERANCE
     if move.figure == "simulated":
         return False  # how many programs differed says nothing of how good they are
     lost = abs(sum(s < 1e4 for s in move.before) - sum(s < 1e4 for s in move.now))

@@ -18,15 +18,15 @@ from gecar.evolution.state import State
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.opcodes import MAX_DUTY_PCT
-from gecar.language.program import Program
 from gecar.language.robot_language import check_robot_language
 from gecar.parallel.executors import open_executor, side_by_side
+from gecar.results.arrival import arrives
 from gecar.results.autosave import Saver
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
 from gecar.results.folder import RunFolder, check_new
 from gecar.results.provenance import fingerprints, versions
 from gecar.search.batches import Batches
-from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals, chosen, times_at_steps
+from gecar.search.chance import chosen
 from gecar.search.evaluation import DriveEvaluator
 from gecar.search.programs import RobotPrograms, noise_seed
 from gecar.world.course.course import load_course
@@ -235,20 +235,6 @@ def measured(task: Task, evolution: Evolution[Program]) -> dict[str, Any]:
     return {
         "verified_on_pymunk": verified_on_pymunk(task, evolution),
         "arrives": arrives(task.world, evolution.best.program, evolution.seed),
-    }
-
-
-def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
-    """Return how a program arrives under `REPORTED_DRAWS` fresh conditions, and at other steps, for result.json."""
-    if program is None:
-        return {"share": 0.0, "of": 0, "median_s": None, "p95_s": None, "steps": {}}
-    (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT))
-    return {
-        "share": times.share,
-        "of": REPORTED_DRAWS,
-        "median_s": times.quantile_s(0.5),
-        "p95_s": times.quantile_s(0.95),
-        "steps": times_at_steps(world, program.opcodes, noise_seed(seed, program)),
     }
 
 

@@ -18,6 +18,7 @@ from gecar.results.fitness_table import (
     DRIVE_TOLERANCE_PCT,
     SEARCH_FIGURES,
     SEARCH_TOLERANCE_PCT,
+    SHARE_TOLERANCE,
     FitnessTable,
     Move,
     moves,
@@ -73,7 +74,7 @@ def _tell(output: Output, found: Sequence[Move], others: Sequence[str], count: i
     if others:
         output.print(
             f"Other versions than the table's ({'; '.join(others)}): drives may move by {DRIVE_TOLERANCE_PCT:g} %, "
-            f"medians of searches by {SEARCH_TOLERANCE_PCT:g} %."
+            f"medians of searches by {SEARCH_TOLERANCE_PCT:g} %, shares that arrive by {SHARE_TOLERANCE:g}."
         )
     if found:
         output.print(moves_table(found))

@@ -110,8 +110,8 @@ def _tell(output: Output, started: Started, result: dict[str, Any], pictures: li
         seed = drive_seed(None, {"seed": started.evolution.seed}, best.program)
         drive = simulate(world, best.program.opcodes, seed)
         output.print(sentence_of(drive))
-        output.print(standing_of(world, drive))
         output.print(arrival_of(result["arrives"]))
+        output.print(standing_of(world, drive))
         same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
         output.print(f"With pymunk moving the body, the drive {same}.")
     output.print(effort_of(result))

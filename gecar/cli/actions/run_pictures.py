@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from gecar.cli.inputs import build_world, drive_seed, find_program, read_run_config
 from gecar.cli.output import Output
 from gecar.errors import expected
-from gecar.language.program import read_program
+from gecar.evolution.lineage import Member
+from gecar.language.program import Program, read_program
 from gecar.plots.drives.classroom import write_classroom_page
 from gecar.plots.drives.trajectory import trajectory
 from gecar.plots.runs.compare_runs import compare_runs
@@ -18,9 +20,10 @@ from gecar.plots.runs.derivation_tree import tree_of
 from gecar.plots.runs.evolution_film import Champion, film_evolution
 from gecar.plots.runs.genealogy import genealogy
 from gecar.plots.style import save
-from gecar.report.drive import PAPER_BEST_S, detail_of, short_arrival, title_of
-from gecar.report.runs import group_names, run_detail, run_title, summaries, summary_table
+from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
+from gecar.report.runs import came_to, group_names, run_detail, run_title, summaries, summary_table
 from gecar.results.ancestry import Ancestry, read_ancestry
+from gecar.results.arrival import arriving, share_of, shares
 from gecar.results.config import Config
 from gecar.results.folder import read_history, read_result
 from gecar.results.run import load_task
@@ -77,7 +80,8 @@ def draw_convergence(folder: Path, target: Path) -> Path:
     """Draw a run's convergence."""
     config, history, result = read_run_config(folder), read_history(folder), read_result(folder)
     title, detail = run_title(config, result), run_detail(config, result)
-    return save(convergence(history, references(config), title, detail), target)
+    winner = Reference(arriving(share_of(result)), result["fitness_s"]) if result["solved"] else None
+    return save(convergence(history, references(config), title, detail, winner), target)
 
 
 def draw_trajectory(folder: Path, target: Path) -> Path:
@@ -85,11 +89,9 @@ def draw_trajectory(folder: Path, target: Path) -> Path:
     file, settings = find_program(folder)
     world, program = build_world(settings), read_program(file)
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-    title, detail = title_of(drive, world.course), detail_of(world, drive)
-    share = short_arrival(read_result(folder).get("arrives"))
+    title = title_of(drive, world.course, share_of(read_result(folder)))
     others = under_drawn_conditions(world, program.opcodes, SHOWN)
-    detail += f" · thin: {SHOWN} drives under other conditions"
-    title = ", ".join(filter(None, [title, share]))
+    detail = f"{detail_of(world, drive)} · thin: {SHOWN} drives under other conditions"
     return save(trajectory(world, program, drive, title=title, detail=detail, others=others), target)
 
 
@@ -114,8 +116,24 @@ def draw_genealogy(folder: Path, target: Path) -> Path:
         f"found in generation {found} · {ancestors:,} ancestors, {len(line) - 1:,} of them in its own line"
     )
     detail += f" · preset {config.preset}, seed {config.seed}"
-    figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, run_title(config, result), detail)
+    title = run_title(config, result)
+    share = _shares_in(load_task(config).world, ancestry, config.seed)
+    figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, share, title, detail)
     return save(figure, target)
+
+
+def _shares_in(world: World, ancestry: Ancestry, seed: int) -> Callable[[Member], float | None]:
+    """Return what measures the share of drives in which an individual's program arrives, each program once."""
+
+    @cache
+    def measured(program: Program) -> float:
+        return shares(world, [program], seed)[0]
+
+    def share(member: Member) -> float | None:
+        program = ancestry.program(member)
+        return None if program is None else measured(program)
+
+    return share
 
 
 def film_run(folder: Path, target: Path) -> Path:
@@ -136,13 +154,14 @@ def film_run(folder: Path, target: Path) -> Path:
 
 def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
     """Drive the best program of each generation that brought a better one, as the run scored it."""
+    members = [(member[0], ancestry.program(member)) for member in ancestry.lineage.champions()]
+    found = [(generation, program) for generation, program in members if program is not None]
+    arriving = shares(world, [program for _, program in found], settings["seed"])
     champions = []
-    for member in ancestry.lineage.champions():
-        program = ancestry.program(member)
-        if program is not None:
-            drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-            title = f"Generation {member[0]} · {title_of(drive, world.course)}"
-            champions.append(Champion(member[0], program, drive, title))
+    for (generation, program), share in zip(found, arriving, strict=True):
+        drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+        title = f"Generation {generation} · {title_of(drive, world.course, share)}"
+        champions.append(Champion(generation, program, drive, title))
     return champions
 
 
@@ -157,9 +176,8 @@ def write_drive_page(folder: Path, target: Path) -> Path:
     file, settings = find_program(folder)
     world, program = build_world(settings), read_program(file)
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-    return write_classroom_page(
-        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
-    )
+    title = title_of(drive, world.course, share_of(read_result(folder)))
+    return write_classroom_page(world, program, drive, target, title, detail_of(world, drive))
 
 
 def references(config: Config) -> Sequence[Reference]:
@@ -189,11 +207,13 @@ def compare(output: Output, folders: Sequence[Path], out: Path) -> tuple[dict[st
         name: [h for n, h in zip(names, histories, strict=True) if n == name] for name in dict.fromkeys(names)
     }
     table = summaries(names, results)
+    came = {name: came_to(group) for name, group in table.items()}
     output.print(summary_table(table))
     same_course = len({(config.course, config.robot) for config in configs}) == 1
     title = f"{len(folders)} runs" + (f" on {configs[0].course}" if same_course else "")
     out.mkdir(parents=True, exist_ok=True)
-    figure = compare_runs(
-        groups, references(configs[0]) if same_course else (), title, "median and middle half of runs"
+    detail = (
+        "median and middle half of runs; legend: the winners' median time and share of drives that arrive"
     )
+    figure = compare_runs(groups, references(configs[0]) if same_course else (), title, detail, came)
     return table, [save(figure, out / "compare.png")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from gecar.reality.recordings.recording import Recording
 
 FRAMES = ("start", "course")
+SEED = 1
+"""Of the fresh conditions that a program's share of arrivals is measured under; as ``gecar simulate`` by default."""
 
 
 def compare(
@@ -52,8 +55,10 @@ def compare(
     """
     from gecar.reality.compare.gap import gap
     from gecar.report.gap import gap_lines, gap_table
+    from gecar.results.arrival import arrives
     from gecar.world.course.course import load_course
     from gecar.world.robot import load_robot
+    from gecar.world.rollout import World
 
     if frame not in FRAMES:
         raise expected("--frame", repr(frame), " or ".join(FRAMES))
@@ -64,7 +69,10 @@ def compare(
     if driven is not None and place == "none":
         raise expected("--course", "none, a blank floor", "the course the program drove on")
     where = None if place == "none" else load_course(place)
-    found = gap(trials, load_robot(robot or trials[0].setup.robot), where, driven, frame == "course")
+    driver = load_robot(robot or trials[0].setup.robot)
+    found = gap(trials, driver, where, driven, frame == "course")
+    if driven is not None and where is not None:
+        found = replace(found, arrives=arrives(World(driver, where), driven, SEED))
     for line in gap_lines(found):
         output.print(line)
     written = _write(found, out, not no_picture)

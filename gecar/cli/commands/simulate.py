@@ -94,8 +94,8 @@ def simulate(
     """
     from gecar.cli.inputs import build_world, drive_seed, find_program
     from gecar.language.program import read_program
-    from gecar.report.drive import arrival_of, drive_table, sentence_of, standing_of
-    from gecar.results.run import arrives
+    from gecar.report.drive import arrival_of, drive_table, sentence_of, standing_of, title_of
+    from gecar.results.arrival import arrives
     from gecar.world.rollout import simulate as run
 
     output = Output(as_json)
@@ -109,12 +109,13 @@ def simulate(
     which = drive_seed(seed, settings, loaded)
     drive = run(world, loaded.opcodes, which, trace=True)
     output.print(sentence_of(drive), style="bold")
-    output.print(standing_of(world, drive))
     arrival = arrives(world, loaded, which)
     output.print(arrival_of(arrival))
-    written = _draw(output, world, loaded, drive, target, colour)
-    written |= _film(output, world, loaded, drive, animate, pace)
-    written |= _play(output, world, loaded, drive, page)
+    output.print(standing_of(world, drive))
+    title = title_of(drive, world.course, arrival["share"])
+    written = _draw(output, world, loaded, drive, target, title, colour)
+    written |= _film(output, world, loaded, drive, animate, title, pace)
+    written |= _play(output, world, loaded, drive, page, title)
     written |= _record(output, world, loaded, drive, record, course)
     output.print_json(
         {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
@@ -138,48 +139,45 @@ def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace
 
 
 def _draw(
-    output: Output, world: World, program: Program, drive: Drive, target: Path | None, colour: str
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, title: str, colour: str
 ) -> dict[str, str]:
     """Draw the drive if a picture is wanted."""
     if target is None:
         return {}
     from gecar.plots.drives.trajectory import trajectory
     from gecar.plots.style import save
-    from gecar.report.drive import detail_of, title_of
+    from gecar.report.drive import detail_of
 
-    title, detail = title_of(drive, world.course), detail_of(world, drive)
+    detail = detail_of(world, drive)
     save(trajectory(world, program, drive, title=title, detail=detail, colour=colour), target)
     output.print(f"Picture: {target}")
     return {"picture": str(target)}
 
 
 def _film(
-    output: Output, world: World, program: Program, drive: Drive, target: Path | None, pace: float
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, title: str, pace: float
 ) -> dict[str, str]:
     """Film the drive if that is wanted."""
     if target is None:
         return {}
     from gecar.plots.drives.animation import film
-    from gecar.report.drive import title_of
 
-    film(world, program, drive, target, title=title_of(drive, world.course), pace=pace)
+    film(world, program, drive, target, title=title, pace=pace)
     output.print(f"Film: {target}")
     return {"film": str(target)}
 
 
 def _play(
-    output: Output, world: World, program: Program, drive: Drive, target: Path | None
+    output: Output, world: World, program: Program, drive: Drive, target: Path | None, title: str
 ) -> dict[str, str]:
     """Write the drive as a page if that is wanted."""
     if target is None:
         return {}
     from gecar.plots.drives.classroom import write_classroom_page
-    from gecar.report.drive import detail_of, title_of
+    from gecar.report.drive import detail_of
 
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_classroom_page(
-        world, program, drive, target, title_of(drive, world.course), detail_of(world, drive)
-    )
+    write_classroom_page(world, program, drive, target, title, detail_of(world, drive))
     output.print(f"Page: {target}")
     return {"page": str(target)}
 

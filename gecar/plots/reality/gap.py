@@ -28,6 +28,7 @@ from gecar.plots.style import (
     new_figure,
 )
 from gecar.reality.compare.gap import CHANNELS, Gap, Path, Trial
+from gecar.results.arrival import with_share
 from gecar.world.rollout import Outcome
 
 TRIAL_COLOURS = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)
@@ -137,12 +138,12 @@ def _times(axes: Axes, found: Gap) -> None:
         axes.annotate(words, (trial.arrival_s, row), (0, 6), textcoords="offset points", size=7, ha="center")
     if found.simulated_s is not None:
         arrived = found.outcome == Outcome.GOAL
-        words = f"simulation {found.simulated_s:.2f}" + ("" if arrived else ", not at GOAL")
+        words = f"line: simulation {with_share(found.simulated_s, found.share)}"
+        words += "" if arrived else ", not at GOAL"
         axes.axvline(found.simulated_s, color=INK, linewidth=1.6, linestyle="-" if arrived else (0, (2, 2)))
-        axes.annotate(words, (found.simulated_s, -0.9), (3, 0), size=7.5, textcoords="offset points",
-                      annotation_clip=False)  # fmt: skip
+        axes.set_xlabel(words, size=7.5, loc="right")
     axes.set_yticks(range(len(names)), names)
-    axes.set_ylim(len(names) - 0.4, -1.1)
+    axes.set_ylim(len(names) - 0.4, -0.7)
     axes.margins(x=0.3)
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ def compare_runs(
     references: Sequence[Reference] = (),
     title: str = "",
     detail: str = "",
+    came_to: Mapping[str, str] = MappingProxyType({}),
 ) -> Figure:
     """Draw groups of runs: of one run its curve, of several the median and the middle half.
 
@@ -33,6 +35,8 @@ def compare_runs(
         Times to draw across the picture.
     title, detail
         What to write above it.
+    came_to
+        What to say of a group's end, by its name.
     """
     with look():
         figure = new_figure(9.0, 6.4)
@@ -40,7 +44,9 @@ def compare_runs(
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
         draw_references(top, references, side=0.0)
         for k, (name, histories) in enumerate(groups.items()):
-            _draw_group(top, bottom, name, histories, CYCLE[k % len(CYCLE)], "-" if k < len(CYCLE) else "--")
+            words = name if len(histories) == 1 else f"{name}, {len(histories)} runs"
+            words = ": ".join(filter(None, [words, came_to.get(name)]))
+            _draw_group(top, bottom, words, histories, CYCLE[k % len(CYCLE)], "-" if k < len(CYCLE) else "--")
         top.set_ylabel("best time to GOAL [s]")
         top.legend(loc="upper right")
         _fit(top, [reference.time_s for reference in references])
@@ -50,13 +56,12 @@ def compare_runs(
 
 
 def _draw_group(
-    top: Axes, bottom: Axes, name: str, histories: Sequence[History], colour: str, dashes: str
+    top: Axes, bottom: Axes, words: str, histories: Sequence[History], colour: str, dashes: str
 ) -> None:
     at = np.unique(np.concatenate([history["evaluations"] for history in histories]))
     best = np.array([_best_at(history, at) for history in histories])
     # A run without GOAL counts as infinitely slow, so its lack pulls the median up and does not drop out.
     low, middle, high = (_finite(np.quantile(best, q, axis=0, method="lower")) for q in (0.25, 0.5, 0.75))
-    words = name if len(histories) == 1 else f"{name}, {len(histories)} runs"
     top.plot(at, middle, color=colour, linestyle=dashes, label=words, drawstyle="steps-post")
     if len(histories) > 1:
         top.fill_between(

@@ -46,6 +46,7 @@ def convergence(
     references: Sequence[Reference] = (),
     title: str = "",
     detail: str = "",
+    winner: Reference | None = None,
 ) -> Figure:
     """Draw a run's history.
 
@@ -58,13 +59,15 @@ def convergence(
         Times to draw across the picture.
     title, detail
         What to write above it.
+    winner
+        The run's best program: its time, and what to write below that. None: the last generation's best.
     """
     generation, best = history["generation"], np.minimum.accumulate(history["best"])
     with look():
         figure = new_figure(8.0, 6.6)
         headline(figure, title, detail)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
-        draw_best(top, generation, best, references)
+        draw_best(top, generation, best, references, winner)
         _draw_begun_anew(top, history, best)
         if "mean_solved" in history:
             top.plot(
@@ -80,23 +83,38 @@ def convergence(
     return figure
 
 
-def draw_best(axes: Axes, generation: Series, best: Series, references: Sequence[Reference]) -> None:
+def draw_best(
+    axes: Axes,
+    generation: Series,
+    best: Series,
+    references: Sequence[Reference],
+    winner: Reference | None = None,
+) -> None:
     """Draw the best time of each generation; generations in which no program reaches GOAL are shaded."""
     solved = best < UNSOLVED
     times = np.where(solved, best, np.nan)
-    draw_references(axes, references)
+    draw_references(axes, references, clear_of_s=times[-1])
     axes.step(generation, times, where="post", color=BLUE, linewidth=2.2, zorder=3, label="best")
     axes.plot(generation[solved], best[solved], "o", color=BLUE, markersize=3, zorder=3)
     axes.set_ylabel("best time to GOAL [s]")
-    _frame(axes, best[solved], references)
+    _frame(axes, [*best[solved], *([winner.time_s] if winner else [])], references)
     if not solved.all():
         _shade_unsolved(axes, generation, int(solved.argmax()) if solved.any() else len(solved))
-    if solved.any():
-        # Beside the axes, where no reference's words are, however near its time.
-        axes.annotate(
-            f"{best[-1]:.2f} s", (1.0, best[-1]), (5, 0), xycoords=("axes fraction", "data"),
-            textcoords="offset points", va="center", weight="bold", color=BLUE,
-        )  # fmt: skip
+    if winner or solved.any():
+        _mark_winner(axes, winner or Reference("", best[-1]))
+
+
+def _mark_winner(axes: Axes, winner: Reference) -> None:
+    """Write a time and words beside the axes, where no reference's words are, however near its time."""
+    # Where drawn conditions judge, the winner is chosen on fresh draws, and seldom is the curve's last point.
+    edge = axes.get_yaxis_transform()
+    axes.plot(
+        1.0, winner.time_s, "<", color=BLUE, markersize=5, transform=edge, clip_on=False, label="winner"
+    )
+    axes.annotate(
+        "\n".join(filter(None, [f"{winner.time_s:.2f} s", winner.words])), (1.0, winner.time_s), (7, 0),
+        xycoords=("axes fraction", "data"), textcoords="offset points", va="center", weight="bold", color=BLUE,
+    )  # fmt: skip
 
 
 def _draw_begun_anew(axes: Axes, history: Mapping[str, Series], best: Series) -> None:
@@ -143,29 +161,45 @@ def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
     )
 
 
-def draw_references(axes: Axes, references: Sequence[Reference], side: float = 1.0) -> None:
-    """Draw times to compare with across a picture of times, their words at its left (0) or right (1) end."""
+def draw_references(
+    axes: Axes, references: Sequence[Reference], side: float = 1.0, clear_of_s: float = -np.inf
+) -> None:
+    """Draw times to compare with across a picture of times.
+
+    Parameters
+    ----------
+    axes
+        Where.
+    references
+        What.
+    side
+        End of the lines that their words stand at: left (0) or right (1).
+    clear_of_s
+        A time that is drawn at that end [s]: words stand above lines, but below those that are below it.
+    """
     for colour, reference in zip((VERMILION, INK, PURPLE), references, strict=False):
+        below = reference.time_s <= clear_of_s
         axes.axhline(reference.time_s, color=colour, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
         axes.annotate(
             f"{reference.words}, {reference.time_s:.2f} s",
             (side, reference.time_s),
-            (4 - 8 * side, 5),
+            (4 - 8 * side, -5 if below else 5),
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
             ha="right" if side else "left",
             size=8,
             color=colour,
+            va="top" if below else "baseline",
             bbox=_VEIL,
         )
 
 
-def _frame(axes: Axes, times: Series, references: Sequence[Reference]) -> None:
+def _frame(axes: Axes, times: Sequence[float], references: Sequence[Reference]) -> None:
     """Choose limits that hold the times and the references, with room for their words."""
     seen = [*times, *(reference.time_s for reference in references)] or [0.0, 60.0]
     low, high = min(seen), max(seen)
     room = max(high - low, 1.0)
-    axes.set_ylim(max(low - 0.08 * room, 0.0), high + 0.16 * room)
+    axes.set_ylim(max(low - 0.13 * room, 0.0), high + 0.16 * room)
 
 
 def _draw_mean(axes: Axes, generation: Series, mean: Series) -> None:

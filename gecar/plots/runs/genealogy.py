@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import re
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Any
 
@@ -22,6 +23,7 @@ from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, Lineage, Member
 from gecar.language.program import Program
 from gecar.plots.runs.convergence import UNSOLVED
 from gecar.plots.style import INK, PAPER, SOFT, VERMILION, headline, look, new_figure
+from gecar.results.arrival import with_share
 
 OPERATORS = {CROSSOVER: "crossover", MUTATION: "mutation", CREEP: "creep"}
 MAX_STEPS = 24
@@ -34,9 +36,10 @@ _MARKS = {
 _COLOURS = "viridis_r"
 _UNSOLVED_COLOUR = "#E9ECEF"
 _WIDTH_IN, _MAP_IN, _ROW_IN = 11.0, 4.4, 0.215
-_LETTERS, _PT = 92, 7.0
+_LETTERS, _PT = 82, 7.0
 
 Ranks = list[npt.NDArray[np.int64]]
+Share = Callable[[Member], float | None]
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ def genealogy(
     lineage: Lineage,
     winner: Member,
     program: Callable[[Member], Program | None],
+    share: Share,
     title: str = "",
     detail: str = "",
 ) -> Figure:
@@ -78,11 +82,12 @@ def genealogy(
         Whose ancestors.
     program
         Gives an individual's program.
+    share
+        Gives the share of drives in which an individual's program arrives, 0..1; None where it is not known.
     title, detail
         What to write above it.
     """
-    steps = steps_of(lineage, winner, program)
-    shown = steps[-MAX_STEPS:]
+    shown = steps_of(lineage, winner, program, share, MAX_STEPS)
     with look():
         below = _ROW_IN * (len(shown) + 2.2)
         figure = new_figure(_WIDTH_IN, _MAP_IN + below + 1.0)
@@ -92,43 +97,54 @@ def genealogy(
         _draw_population(figure, top, lineage)
         _draw_family(top, lineage, winner, ranks)
         _draw_line(top, lineage, winner, ranks)
-        _list(bottom, shown, len(steps) - len(shown))
+        _list(bottom, shown, len(_changed(lineage, winner)) - len(shown))
     return figure
 
 
-def steps_of(lineage: Lineage, winner: Member, program: Callable[[Member], Program | None]) -> list[Step]:
-    """Return the steps in which an individual's line got another program, from its first."""
-    steps: list[Step] = []
-    before: list[str] = []
-    for member in lineage.line(winner):
-        changed = lineage.changed(member)
-        if steps and not changed:
-            continue
-        after = _tokens(program(member))
-        words = _compared(before, after) if steps else [("".join(after), False)]
-        steps.append(
-            Step(member[0], _operators(lineage, member), fitness_words(lineage.merit(member)), words)
-        )
-        before = after
-    return steps
+def steps_of(
+    lineage: Lineage,
+    winner: Member,
+    program: Callable[[Member], Program | None],
+    share: Share,
+    most: int = sys.maxsize,
+) -> list[Step]:
+    """Return the latest steps, at most so many, in which an individual's line got another program."""
+    members = _changed(lineage, winner)
+    texts = [_tokens(program(member)) for member in members]
+    words = [[("".join(texts[0]), False)], *(_compared(*pair) for pair in pairwise(texts))]
+    return [
+        Step(member[0], _operators(lineage, member, share), _came_to(lineage, member, share), pieces)
+        for member, pieces in list(zip(members, words, strict=True))[-most:]
+    ]
 
 
-def fitness_words(merit: float) -> str:
-    """Say how good an individual was; see `gecar.evolution.lineage.INDIVIDUAL`."""
+def _changed(lineage: Lineage, winner: Member) -> list[Member]:
+    """Return those of an individual's line whose program differs from their parent's, and the first."""
+    return [member for k, member in enumerate(lineage.line(winner)) if k == 0 or lineage.changed(member)]
+
+
+def _came_to(lineage: Lineage, member: Member, share: Share) -> str:
+    """Say how good an individual was."""
+    merit = lineage.merit(member)
+    return fitness_words(merit, share(member) if merit < UNSOLVED else None)
+
+
+def fitness_words(merit: float, share: float | None) -> str:
+    """Say how good a merit is (`gecar.evolution.lineage.INDIVIDUAL`), and at GOAL also the share of drives that arrive."""
     if merit < UNSOLVED:
-        return f"{merit:.2f} s"
-    share = UNSOLVED + 1.0 - merit
-    return "no program" if share < -0.5 else f"{100 * max(share, 0.0):.0f} % of the way"
+        return with_share(merit, share)
+    far = UNSOLVED + 1.0 - merit
+    return "no program" if far < -0.5 else f"{100 * max(far, 0.0):.0f} % of the way"
 
 
-def _operators(lineage: Lineage, member: Member) -> str:
+def _operators(lineage: Lineage, member: Member, share: Share) -> str:
     """Say what changed an individual's program, and whom it was crossed with."""
     parents, changed = lineage.parents(member), lineage.changed(member)
     if not parents:
         return "first population" if member[0] == 0 else "new"
     words = [name for bit, name in OPERATORS.items() if changed & bit]
     if changed & CROSSOVER:
-        words[0] += f" with {fitness_words(lineage.merit(parents[1]))}"
+        words[0] += f" with {_came_to(lineage, parents[1], share)}"
     return ", ".join(words)
 
 
@@ -221,7 +237,7 @@ def _list(axes: Axes, steps: Sequence[Step], earlier: int) -> None:
     axes.set(xlim=(0.0, 1.0), ylim=(len(steps) - 0.4, -1.6))
     names: dict[str, Any] = {"size": 8, "color": SOFT, "va": "center"}
     first = "program, what is new in bold" + (f" ({earlier} earlier steps are not shown)" if earlier else "")
-    columns = (0.045, 0.06, 0.45, 0.465)
+    columns = (0.045, 0.06, 0.505, 0.52)
     for x, words, side in zip(
         columns, ("generation", "by", "came to", first), ("right", "left", "right", "left"), strict=True
     ):

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from gecar.plots.runs.convergence import UNSOLVED
 from gecar.plots.style import BLUE, FAINT, INK, SOFT, VERMILION, headline, look, new_figure
+from gecar.results.arrival import arriving
 from gecar.results.cells import Cell
 
 Floats = npt.NDArray[np.float64]
@@ -108,7 +109,8 @@ def _typical(cell: Cell) -> tuple[float, str]:
     figures = cell.figures()
     time = f"{figures['mean_solved_s']:.2f}" if cell.solved else "–"
     spread = f" ± {figures['sd_solved_s']:.2f}" if cell.solved > 1 else ""
-    return figures["mean_solved_s"], f"{time}{spread}\n{cell.solved} of {len(cell.records)} at GOAL"
+    words = f"{time}{spread}\n{cell.solved} of {len(cell.records)} at GOAL\n{arriving(cell.share)}"
+    return figures["mean_solved_s"], words
 
 
 def _draw_heat(axes: Axes, times: Floats, words: npt.NDArray[np.object_], scale: Any) -> None:
@@ -138,9 +140,11 @@ def _draw_cell(axes: Axes, cell: Cell, paper_s: float) -> None:
     top = np.where(np.isnan(high), 1e3, high)
     axes.fill_between(cell.generation, low, top, color=BLUE, alpha=0.15, step="post", lw=0)
     axes.step(cell.generation, middle, where="post", color=BLUE, linewidth=2.2, zorder=3)
-    if np.isfinite(middle[-1]):
+    median_s = cell.quantile_s(0.5)
+    if np.isfinite(median_s):
+        words = f"{median_s:.2f} s\n{arriving(cell.share)}"
         above = axes.annotate(
-            f"{middle[-1]:.2f} s", (cell.generation[-1], middle[-1]), (0, 5), textcoords="offset points",
+            words, (cell.generation[-1], median_s), (0, 5), textcoords="offset points",
             ha="right", size=8, weight="bold", color=BLUE, zorder=5,
         )  # fmt: skip
         above.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5})

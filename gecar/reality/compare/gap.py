@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -115,6 +116,8 @@ class Gap:
         Where, and who in the simulation.
     in_course
         Whether positions are the course's; otherwise all paths start at one point, as in the paper.
+    arrives
+        How the program arrives under fresh conditions, as in result.json; None where that is not measured.
     """
 
     trials: tuple[Trial, ...]
@@ -123,6 +126,12 @@ class Gap:
     course: Course | None
     robot: Robot
     in_course: bool
+    arrives: Mapping[str, Any] | None = None
+
+    @property
+    def share(self) -> float | None:
+        """Share of drives in which the program arrives, 0..1; None where that is not measured."""
+        return self.arrives["share"] if self.arrives else None
 
 
 def gap(
