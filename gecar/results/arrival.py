@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gecar.evolution.ask_tell import noise_seed
 from gecar.language.program import Program
 from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals, times_at_steps
+from gecar.search.programs import noise_seed
 from gecar.world.rollout import World
 
 

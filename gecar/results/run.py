@@ -18,6 +18,7 @@ from gecar.evolution.state import State
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.opcodes import MAX_DUTY_PCT
+from gecar.language.program import Program
 from gecar.language.robot_language import check_robot_language
 from gecar.parallel.executors import open_executor, side_by_side
 from gecar.results.arrival import arrives

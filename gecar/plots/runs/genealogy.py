@@ -130,7 +130,7 @@ def _came_to(lineage: Lineage, member: Member, share: Share) -> str:
 
 
 def fitness_words(merit: float, share: float | None) -> str:
-    """Say how good a merit is (`gecar.evolution.lineage.INDIVIDUAL`), and at GOAL also the share of drives that arrive."""
+    """Say how good a merit is (`gecar.evolution.lineage.INDIVIDUAL`), at GOAL with the share of drives that arrive."""
     if merit < UNSOLVED:
         return with_share(merit, share)
     far = UNSOLVED + 1.0 - merit

@@ -145,7 +145,7 @@ class Course:
         return shortest_way(self.layout, self.start_tile, sequence, self.start.x_m, self.start.y_m)
 
     def lower_bound_s(self, robot: Robot) -> float:
-        """Return a lower bound on a robot's time to GOAL [s], proven for tyres that hold: `gecar.world.course.lower_bound.fastest_time`."""
+        """Return a lower bound on a robot's time to GOAL [s], proven for tyres that hold (`fastest_time`)."""
         free_to_turn = len(self.walls) == 0 and not self.obstacles
         return fastest_time(self.shortest, self.start.heading_rad, robot, free_to_turn)
 
