@@ -146,3 +146,73 @@ def _creep(
                 rank = rank + step if 0 <= rank + step < n else rank - step
                 moved = codon - codon % n + scale.at_rank[first + rank]
                 genomes[i, k] = moved if moved < 256 else moved - n
+
+
+@dataclass(frozen=True)
+class Duplicate:
+    """A subtree comes to stand twice, one after the other, where the grammar has a production for that.
+
+    A robot that does the same twice mostly drives as before, and what follows may change one copy and keep the other: gene
+    duplication (Ohno 1970; in GE O'Neill and Ryan, IEEE T-EC 5(4), 2001, who copy codons wherever they stand).
+
+    Attributes
+    ----------
+    rate
+        Probability of each genome that is valid and has room.
+    """
+
+    rate: float
+
+    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+        """Return the children (genomes, codons)."""
+        mapped = mapper.map(genomes)
+        whole = mapped.valid & (mapped.used <= genomes.shape[1])
+        twice = _twice(mapper.grammar)
+        _duplicate(
+            genomes, whole, mapped.offsets, mapped.symbols, mapped.subtree_ends, twice, self.rate, streams
+        )
+        return genomes
+
+
+@lru_cache(maxsize=8)
+def _twice(grammar: Grammar) -> Int32s:
+    """Return each nonterminal's choice that holds itself twice and no other nonterminal, -1 without (nonterminals,)."""
+    choices = np.full(len(grammar.rules), -1, np.int32)
+    for symbol, rule in enumerate(grammar.rules):
+        for choice, production in reversed(list(enumerate(rule.productions))):
+            if [part for part in production.parts if not isinstance(part, str)] == [symbol, symbol]:
+                choices[symbol] = choice
+    return choices
+
+
+@compiled
+def _duplicate(
+    genomes: Bytes,
+    whole: Bools,
+    offsets: Int64s,
+    symbols: Int32s,
+    ends: Int32s,
+    twice: Int32s,
+    rate: float,
+    streams: Streams,
+) -> None:
+    codons = genomes.shape[1]
+    for i in range(genomes.shape[0]):
+        if uniform(streams[i]) >= rate or not whole[i]:
+            continue
+        first, used = offsets[i], offsets[i + 1] - offsets[i]
+        places = 0
+        for k in range(used):
+            places += twice[symbols[first + k]] >= 0
+        if places == 0:
+            continue
+        skip = below(streams[i], places)
+        begin = 0
+        while twice[symbols[first + begin]] < 0 or skip > 0:
+            skip -= twice[symbols[first + begin]] >= 0
+            begin += 1
+        length = ends[first + begin] - begin
+        if used + 1 + length <= codons:
+            for k in range(codons - 1, begin, -1):
+                genomes[i, k] = genomes[i, k - 1 - length] if k > begin + length else genomes[i, k - 1]
+            genomes[i, begin] = twice[symbols[first + begin]]

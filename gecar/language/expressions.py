@@ -20,7 +20,8 @@ _KINDS = (
     r"|(?P<mark>[<>=!]=|[-+*/(){},:;<>])|(?P<stray>\S)|\Z"
 )
 _TOKEN = re.compile(f"{_SPACE}(?:{_KINDS})")
-_TOKEN_OR_CALL = re.compile(rf"{_SPACE}(?:(?P<call>motor\([-+*/0-9, ]*\))|{_KINDS})")
+_WHOLE = r"(?P<call>motor\([-+*/0-9, ]*\))|(?P<condition>\w+ ?[<>]=? ?[-+*/0-9() ]*(?=[{:]))"
+_TOKEN_OR_WHOLE = re.compile(rf"{_SPACE}(?:{_WHOLE}|{_KINDS})")
 _SENSORS = {sensor.word: sensor for sensor in Sensor}
 _COMPARISONS = {comparison.word: comparison for comparison in Comparison}
 
@@ -56,13 +57,14 @@ def _tokens(text: str, pattern: re.Pattern[str]) -> list[Token]:
 class Expressions:
     """Recursive descent; `next` is the token not yet taken, `line_indent` that of the line it stands in.
 
-    With `calls`, a ``motor(...)`` of plain numbers is one token, of kind "call".
+    With `whole`, a ``motor(...)`` of plain numbers is one token, of kind "call", and so is a comparison of a word with
+    plain numbers before a branch, of kind "condition".
     """
 
-    def __init__(self, text: str, source: str, calls: bool = False) -> None:
+    def __init__(self, text: str, source: str, whole: bool = False) -> None:
         self.text = text
         self.source = source
-        self.tokens = iter(_tokens(text, _TOKEN_OR_CALL if calls else _TOKEN))
+        self.tokens = iter(_tokens(text, _TOKEN_OR_WHOLE if whole else _TOKEN))
         self.depth = 0
         self.next = next(self.tokens)
         self.line_indent = max(self.next.indent, 0)

@@ -24,7 +24,7 @@ from functools import lru_cache
 from gecar.errors import InputError, expected
 from gecar.language import opcodes
 from gecar.language.expressions import Expressions
-from gecar.language.statements import If, Motor, MotorUntil, Statement
+from gecar.language.statements import Condition, If, Motor, MotorUntil, Statement
 
 MAX_CHARACTERS = 100_000
 MAX_STATEMENTS = 10_000
@@ -50,7 +50,7 @@ def parse_statements(text: str, source: str) -> tuple[Statement, ...]:
     if len(text) > MAX_CHARACTERS:
         raise expected(source, f"{len(text)} characters", f"a program of at most {MAX_CHARACTERS}")
     try:
-        return _Parser(text, source, calls=True).program()
+        return _Parser(text, source, whole=True).program()
     except InputError:  # once more, token by token, for the place of the fault
         return _Parser(text, source).program()
 
@@ -61,11 +61,21 @@ def _call(text: str) -> Statement:
     return _Parser(text, "<call>").motor()
 
 
+@lru_cache(maxsize=16_384)
+def _condition(text: str) -> Condition:
+    """Read a comparison of a sensor with plain numbers."""
+    parser = _Parser(text, "<condition>")
+    condition = parser.condition()
+    if parser.next.kind != "end":
+        raise parser.fault("the end of the condition")
+    return condition
+
+
 class _Parser(Expressions):
     """Recursive descent through statements and the expressions in them."""
 
-    def __init__(self, text: str, source: str, calls: bool = False) -> None:
-        super().__init__(text, source, calls)
+    def __init__(self, text: str, source: str, whole: bool = False) -> None:
+        super().__init__(text, source, whole)
         self.statements = 0
 
     def program(self) -> tuple[Statement, ...]:
@@ -126,7 +136,7 @@ class _Parser(Expressions):
         indent = self.line_indent
         self.deeper()
         self.take()
-        condition = self.condition()
+        condition = _condition(self.take().text) if self.next.kind == "condition" else self.condition()
         braces = self.next.text == "{"
         then = self.branch(indent)
         otherwise: tuple[Statement, ...] = ()

@@ -102,9 +102,8 @@ class DriveEvaluator:
         for begin, end in ((0, first), (first, self.draws - 1)):
             times = scores["drawn_s"][:, :begin]
             missed = np.isinf(times).sum(axis=1)
-            behind = np.array(
-                [np.median([s["fitness_s"], *s["drawn_s"][:begin]]) > MARGIN * to_beat_s for s in scores]
-            )
+            so_far = np.median(np.column_stack([scores["fitness_s"], times]), axis=1)
+            behind = so_far > MARGIN * to_beat_s
             left = np.flatnonzero(
                 (scores["fitness_s"] < UNSOLVED) & (missed <= allowed) & ~(behind & (begin > 0))
             )

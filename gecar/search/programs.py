@@ -12,7 +12,7 @@ import numpy.typing as npt
 from gecar.evolution.problem import Problem
 from gecar.evolution.scores import Floats, Scores
 from gecar.language.mapping import Mapped
-from gecar.language.opcodes import LINE, MAX_DUTY_PCT, MOTOR, MOTOR_UNTIL, OP, A, B
+from gecar.language.opcodes import LINE, MAX_DUTY_PCT, NOT_EQUAL, A, B
 from gecar.language.program import Program
 from gecar.search.chance import add_drives, n_times, wants_more
 from gecar.search.fitness import score_type
@@ -69,8 +69,8 @@ class RobotPrograms(Problem[Program]):
     def meaning(self, program: Program) -> bytes:
         """Return opcodes without line numbers, duties cut at the cap."""
         rows = program.opcodes[:, :LINE].copy()
-        drives = (rows[:, OP] == MOTOR) | (rows[:, OP] == MOTOR_UNTIL)
-        rows[drives, A : B + 1] = np.clip(rows[drives, A : B + 1], -self.duty_cap_pct, self.duty_cap_pct)
+        cap = max(self.duty_cap_pct, NOT_EQUAL)  # what a TEST holds in these columns stays as it is
+        np.minimum(np.maximum(rows[:, A : B + 1], -cap), cap, out=rows[:, A : B + 1])
         return rows.tobytes()
 
     def seed(self, program: Program, seed: int) -> int:

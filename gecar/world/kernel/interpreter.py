@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import kernel
-from gecar.language.opcodes import JUMP, MOTOR_UNTIL, TEST
-from gecar.random_streams import normal
+from gecar.language.opcodes import EQUAL, JUMP, MOTOR_UNTIL, TEST
+from gecar.random_streams import LARGEST_NORMAL, normal, skip_normal
 from gecar.world.kernel.sensing import RING, delayed, glance, lag_keep, lagged, reported
 
 # Where the program stands. `due_ms` is the schedule the program asks for; steps round it, but never add up errors.
@@ -91,12 +91,17 @@ def look(n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> None:
 
 
 @kernel
+def reflection(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> float:
+    """Return the reflection [%] that a sensor reports on at step ``n``: lagged and late, without noise."""
+    if p.sensor_lag == 0.0 and p.sensor_delay == 0.0:
+        return see(sensor, s, p, floor)
+    return delayed(eyes.rings, sensor * RING, n, p.sensor_delay / dt)
+
+
+@kernel
 def read_sensor(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> float:
     """Return the whole percent a sensor reports at step ``n``."""
-    if p.sensor_lag == 0.0 and p.sensor_delay == 0.0:
-        level = see(sensor, s, p, floor)
-    else:
-        level = delayed(eyes.rings, sensor * RING, n, p.sensor_delay / dt)
+    level = reflection(sensor, n, s, p, dt, floor, eyes)
     noise = eyes.noise_pct * normal(eyes) if eyes.noise_pct > 0.0 else 0.0
     return reported(level, noise, p)
 
@@ -119,9 +124,17 @@ def holds(reading: float, comparison: int, threshold: float) -> bool:
 def test_row(
     program: npt.NDArray[np.int32], row: int, k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
-    """Whether the test in a row holds now."""
-    reading = read_sensor(program[row, 1], k.step, s, p, dt, floor, eyes)
-    return holds(reading, program[row, 2], program[row, 3] / 1000.0)
+    """Whether the test in a row holds now; as a reading compares, but noise that cannot matter is only skipped."""
+    comparison, threshold = program[row, 2], program[row, 3] / 1000.0
+    level = reflection(program[row, 1], k.step, s, p, dt, floor, eyes)
+    most = LARGEST_NORMAL * eyes.noise_pct
+    answer = holds(reported(level, most, p), comparison, threshold)
+    if eyes.noise_pct == 0.0:
+        return answer
+    if comparison < EQUAL and answer == holds(reported(level, -most, p), comparison, threshold):
+        skip_normal(eyes)
+        return answer
+    return holds(reported(level, eyes.noise_pct * normal(eyes), p), comparison, threshold)
 
 
 @kernel

@@ -41,7 +41,10 @@ CARRIED = np.dtype([(field, np.float64) for field in _CARRIED])
 _P = len(STATE.names or ()) * LANES
 _C = _P + len(PHYSICS.names or ()) * LANES
 _K = _C + len(DERIVED.names or ()) * LANES
-_DUE = _K + _CARRIED.index("due") * LANES
+_DUE, _LEFT, _RIGHT, _COLUMN, _ROW, _WAKE = (
+    _K + _CARRIED.index(field) * LANES
+    for field in ("due", "left_command", "right_command", "column", "row", "wake")
+)
 N_FLAT = _K + len(_CARRIED) * LANES
 
 _load_state, _store_state = lane_access(STATE, LANES, 0)
@@ -276,12 +279,21 @@ def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, e
     if outcome != RUNNING:
         ends.outcome[job], ends.steps[job], ends.passed[job] = outcome, n, m.passed[lane]
         return False
-    k.left_command = min(max(control.left_duty, -p.duty_cap), p.duty_cap)
-    k.right_command = min(max(control.right_duty, -p.duty_cap), p.duty_cap)
-    k.column, k.row = np.floor(x * floor.per_tile), np.floor(y * floor.per_tile)
-    k.wake = n + 1.0 if control.until >= 0 else min(control.due_step, limit) * 1.0
-    _store_carried(m.flat, lane, k)
+    _change(m.flat, _LEFT + lane, min(max(control.left_duty, -p.duty_cap), p.duty_cap))
+    _change(m.flat, _RIGHT + lane, min(max(control.right_duty, -p.duty_cap), p.duty_cap))
+    _change(m.flat, _COLUMN + lane, np.floor(x * floor.per_tile))
+    _change(m.flat, _ROW + lane, np.floor(y * floor.per_tile))
+    wake = n + 1 if control.until >= 0 else min(control.due_step, limit)
+    if wake > n + 1 or m.flat[_WAKE + lane] > n + 1:
+        m.flat[_WAKE + lane] = wake
     return True
+
+
+@kernel
+def _change(flat: npt.NDArray[np.float64], at: int, value: float) -> None:
+    """Store a lane's number if it is another: a vector load soon after a scalar store waits for it."""
+    if flat[at] != value:
+        flat[at] = value
 
 
 @kernel
