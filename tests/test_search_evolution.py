@@ -37,6 +37,13 @@ VARIANTS = {
     "PonyGE2's": {"crossover": "variable_one_point", "mutation": "one_used_codon", "tournament": 2},
     "new programs": {"duplicates": "run", "mutation": "used_codon", "checkpoint_credit": True},
     "begins anew": {"restart_after": 1, "mutation_rate": 0.0},
+    "grows": {
+        "generations": 16,
+        "restart_after": 1,
+        "restart": "grown",
+        "creep_rate": 0.3,
+        "creep_most": 2.0,
+    },
     "lexicase, ptc2": {"selection": "lexicase", "initialisation": "ptc2", "duplicates": "generation"},
 }
 
@@ -113,6 +120,23 @@ def test_an_elite_keeps_the_best_and_without_one_it_may_be_lost() -> None:
     assert best == sorted(best, reverse=True)
     histories = [generations(evolution("no elite, odd", seed), 7).history for seed in range(5)]
     assert any(h[k + 1].best > h[k].best for h in histories for k in range(6))
+
+
+def test_a_second_population_may_begin_and_then_programs_grow_from_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    evolving, begun = evolution("grows"), []
+    begin = evolving._breeder.begin
+    monkeypatch.setattr(evolving._breeder, "begin", lambda *args: begun.append(args[0]) or begin(*args))
+    lengths = []
+    while not evolving.finished:
+        longest = max(len(evolving.best.program.opcodes), 1) if evolving.history else 1
+        asked = evolving.ask()
+        lengths.append(max((len(one.program.opcodes) for one in asked), default=0) / longest)
+        evolving.tell(Toy()(asked))
+    assert len(begun) == 2
+    assert evolving._patience.restarts > 2
+    assert max(lengths[begun[1] + 1 :]) >= 2.0
 
 
 def test_a_population_that_finds_nothing_faster_begins_anew_and_the_best_stays() -> None:

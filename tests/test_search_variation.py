@@ -1,5 +1,7 @@
 """The operators one by one: what they change, how often, and what they must leave alone."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from searching import MAPPER, SMALL
 
 from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.evolution.initialisation import initialise
-from gecar.evolution.mutation import Creep, Flip
+from gecar.evolution.mutation import Creep, Duplicate, Flip
 from gecar.evolution.selection import deviations, lexicase, tournament
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
@@ -125,6 +127,42 @@ def test_creep_goes_by_the_numbers_values_not_by_their_place_in_the_file() -> No
     moved = RICH.map(Creep(1.0)(genomes.copy(), RICH, spawn(1, 1, 0, 60)))
     after = {before: {moved.text(i) for i in range(60) if i % 3 == k} for k, before in enumerate("312")}
     assert after == {"3": {"2"}, "1": {"2"}, "2": {"1", "3"}}
+
+
+def test_creep_moves_no_more_numbers_of_a_long_program_than_asked() -> None:
+    before = random_genomes(400)
+    first = MAPPER.map(before)
+    second = MAPPER.map(Creep(1.0, most=2.0)(before.copy(), MAPPER, spawn(1, 1, 0, 400)))
+    moved = [np.sum(first.choices[a:b] != second.choices[a:b]) for a, b in pairwise(first.offsets)]
+    numbers = np.array(
+        [
+            np.sum(first.symbols[a:b] == MAPPER.grammar.nonterminals.index("<num>"))
+            for a, b in pairwise(first.offsets)
+        ]
+    )
+    long = numbers > 5
+    assert np.mean(np.array(moved)[long]) == pytest.approx(2.0, abs=0.25)
+
+
+def test_duplication_makes_a_subtree_stand_twice_in_a_row() -> None:
+    grammar = Mapper(parse_grammar("<a> ::= x | <a><a> | <n>\n<n> ::= 1 | 2 | 3"))
+    before = grammar.map(np.array([[1, 0, 2, k % 3, *[0] * 20] for k in range(60)], np.uint8))
+    genomes = np.array([[1, 0, 2, k % 3, *[0] * 20] for k in range(60)], np.uint8)
+    after = grammar.map(Duplicate(1.0)(genomes, grammar, spawn(1, 1, 0, 60)))
+    for k in range(60):
+        number = before.text(k)[1:]
+        assert after.valid[k]
+        assert after.text(k) in {f"xx{number}", f"x{number}{number}", f"x{number}x{number}"}
+    assert len({after.text(k) for k in range(60)}) == 9
+
+
+def test_duplication_leaves_alone_what_has_no_room_and_what_cannot_stand_twice() -> None:
+    full = np.array([[1, 0, 2, 2]], np.uint8)
+    grammar = Mapper(parse_grammar("<a> ::= x | <a><a> | <n>\n<n> ::= 1 | 2 | 3"))
+    assert np.array_equal(Duplicate(1.0)(full.copy(), grammar, spawn(1, 1, 0, 1)), full)
+    once = Mapper(parse_grammar("<a> ::= <n>y | <n>\n<n> ::= 1 | 2 | 3"))
+    genomes = random_genomes(20, 10)
+    assert np.array_equal(Duplicate(1.0)(genomes.copy(), once, spawn(1, 1, 0, 20)), genomes)
 
 
 def test_a_tournament_of_five_prefers_the_best_as_often_as_theory_says() -> None:

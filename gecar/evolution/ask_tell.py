@@ -248,9 +248,21 @@ class Evolution(Generic[P]):
 
     def _breed(self) -> Bred[P]:
         generation, known = len(self.history), self._cache.__contains__
-        if not self.history or self._patience.at_its_end:
+        stagnant = self._patience.at_its_end
+        if stagnant and self.settings.restart == "grown" and self._patience.restarts > 0:
+            return self._grow(generation, known)
+        if stagnant or not self.history:
             return self._breeder.begin(generation, known)
         return self._breeder.next(self.genomes, self.scores, generation, known)
+
+    def _grow(self, generation: int, known: Callable[[bytes], bool]) -> Bred[P]:
+        """Breed from the best so far by doubling subtrees; those of earlier populations are nobody's children."""
+        genomes = np.array([one.genome for one in self.contenders])
+        scores = np.concatenate([one.score for one in self.contenders])
+        bred = self._breeder.next(genomes, scores, generation, known, grown=True)
+        before = {genome.tobytes(): i for i, genome in enumerate(self.genomes)}
+        places = np.array([before.get(genome.tobytes(), -1) for genome in genomes], np.int32)
+        return replace(bred, parents=places[bred.parents])
 
     def _score(self, bred: Bred[P], told: Scores) -> Scores:
         """Put together the population's scores: invalid, known before, or told now."""

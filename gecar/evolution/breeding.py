@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
 from gecar.evolution.initialisation import initialise
-from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, differs
-from gecar.evolution.mutation import Creep, Flip, Renew
+from gecar.evolution.lineage import CREEP, CROSSOVER, DUPLICATION, MUTATION, differs
+from gecar.evolution.mutation import Creep, Duplicate, Flip, Renew
 from gecar.evolution.phenotypes import Phenotype, Phenotypes
 from gecar.evolution.problem import P, Problem
 from gecar.evolution.scores import Scores, merits
@@ -50,6 +50,9 @@ class Bred(Generic[P]):
     changed: Bytes
 
 
+GROWN = 0.7
+"""Probability of a child of a stagnant population that one of its subtrees is doubled; numbers of all may creep."""
+
 Drawn = tuple[Bytes, Int32s, Bytes]
 """Genomes, parents and changes, as in `Bred`."""
 
@@ -73,6 +76,7 @@ class Breeder(Generic[P]):
         self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
         self._phenotypes = Phenotypes(mapper, problem)
         self._operators = _operators(settings)
+        self._growth: list[tuple[int, Operator]] = [(DUPLICATION, Duplicate(GROWN)), *_creep(settings)]
 
     def read(self, genomes: Bytes) -> list[Phenotype[P] | None]:
         """Return what genomes derive."""
@@ -90,7 +94,12 @@ class Breeder(Generic[P]):
         return self._without_duplicates(draw, 0, known)
 
     def next(
-        self, genomes: Bytes, scores: Scores, generation: int, known: Callable[[bytes], bool]
+        self,
+        genomes: Bytes,
+        scores: Scores,
+        generation: int,
+        known: Callable[[bytes], bool],
+        grown: bool = False,
     ) -> Bred[P]:
         """Return the population bred from one that has its scores.
 
@@ -102,7 +111,10 @@ class Breeder(Generic[P]):
             The number of the new one.
         known
             Whether a program, by its digest, was scored before.
+        grown
+            Whether children double a subtree instead of being crossed and mutated.
         """
+        operators = self._growth if grown else self._operators
         n_elites = self.settings.elites
         ranked = merits(scores, self.problem.partial_credit)
         elites = np.argsort(ranked, kind="stable")[:n_elites].astype(np.int32)
@@ -111,7 +123,7 @@ class Breeder(Generic[P]):
             n = self.settings.population - n_elites
             streams = spawn(self.seed, generation, attempt, n + n % 2)
             chosen = self._select(ranked, scores, streams)
-            children, changed = self._vary(genomes[chosen], streams)
+            children, changed = self._vary(operators, genomes[chosen], streams)
             pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
             if self.settings.mutation == "renew":
                 pairs[:] = -1
@@ -123,10 +135,12 @@ class Breeder(Generic[P]):
 
         return self._without_duplicates(draw, n_elites, known)
 
-    def _vary(self, children: Bytes, streams: Streams) -> tuple[Bytes, Bytes]:
+    def _vary(
+        self, operators: list[tuple[int, Operator]], children: Bytes, streams: Streams
+    ) -> tuple[Bytes, Bytes]:
         """Return the children as the operators leave them, and which operators changed what they derive."""
         changed, before = np.zeros(len(children), np.uint8), self.mapper.map(children)
-        for bit, operator in self._operators:
+        for bit, operator in operators:
             children = operator(children, self.mapper, streams)
             after = self.mapper.map(children)
             changed += np.uint8(bit) * differs(before, after)
@@ -171,8 +185,11 @@ def _operators(settings: EvolutionSettings) -> list[tuple[int, Operator]]:
     }
     rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
     flip = Flip(rate, within_used=settings.mutation != "codon")
-    creep: list[tuple[int, Operator]] = [(CREEP, Creep(settings.creep_rate))] if settings.creep_rate else []
-    return [(CROSSOVER, crossover[settings.crossover]), (MUTATION, flip), *creep]
+    return [(CROSSOVER, crossover[settings.crossover]), (MUTATION, flip), *_creep(settings)]
+
+
+def _creep(settings: EvolutionSettings) -> list[tuple[int, Operator]]:
+    return [(CREEP, Creep(settings.creep_rate, settings.creep_most))] if settings.creep_rate else []
 
 
 def _duplicates(

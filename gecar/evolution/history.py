@@ -98,31 +98,38 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
     )
 
 
+WITHOUT_SUCCESS = 4
+"""Of 40 populations on the paper's course 39 had their first success within 36 generations, the other one never."""
+
+
 class Patience:
-    """Says when a population has come to its end: it holds a success, and for so many generations no better one.
+    """Says when a population has come to its end: for so many generations it held nothing better.
 
     Parameters
     ----------
     generations
-        How many; 0 is without end.
+        How many, once it holds a success; without one it has `WITHOUT_SUCCESS` times as many. 0 is without end.
     """
 
     def __init__(self, generations: int) -> None:
         self._limit = generations
         self._best, self._idle = UNSOLVED, 0
+        self.restarts = 0
 
     @property
     def at_its_end(self) -> bool:
         """Whether the next generation is to be a new population."""
-        return 0 < self._limit <= self._idle
+        limit = self._limit if self._best < UNSOLVED else WITHOUT_SUCCESS * self._limit
+        return 0 < limit <= self._idle
 
     def see(self, best: float) -> None:
         """Take the best merit of a generation; after an end it is that of a new population."""
         if self.at_its_end:
             self._best, self._idle = UNSOLVED, 0
+            self.restarts += 1
         if best < self._best:
             self._best, self._idle = best, 0
-        elif self._best < UNSOLVED:
+        else:
             self._idle += 1
 
 

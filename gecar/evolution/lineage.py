@@ -20,7 +20,7 @@ Int32s = npt.NDArray[np.int32]
 Floats = npt.NDArray[np.float64]
 Individuals = npt.NDArray[np.void]
 
-CROSSOVER, MUTATION, CREEP = 1, 2, 4
+CROSSOVER, MUTATION, CREEP, DUPLICATION = 1, 2, 4, 8
 """What can change a program, as bits."""
 
 INDIVIDUAL = np.dtype(
@@ -28,7 +28,8 @@ INDIVIDUAL = np.dtype(
 )
 """``parent``, ``mate``: places in the generation before, as in `gecar.evolution.breeding.Bred`. ``merit``: time to GOAL
 [s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: what made its program another than its
-parent's, `CROSSOVER` | `MUTATION` | `CREEP`. ``codons``: how many are kept of it; none if nothing changed it."""
+parent's, `CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`. ``codons``: how many are kept of it; none if nothing
+changed it."""
 
 MAX_BYTES = 32_000_000
 """What is kept of a run at most, 5,000 generations of 200 and more; beyond it nothing is, so that memory stays flat."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -120,25 +121,33 @@ class Creep:
     ----------
     rate
         Probability of each such codon.
+    most
+        How many of a genome step on average, at most, so that long programs are not changed all over.
     """
 
     rate: float
+    most: float = math.inf
 
     def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
         """Return the children (genomes, codons)."""
         mapped = mapper.map(genomes)
-        _creep(genomes, mapped.offsets, mapped.symbols, _scale(mapper.grammar), self.rate, streams)
+        _creep(genomes, mapped.offsets, mapped.symbols, _scale(mapper.grammar), self.rate, self.most, streams)
         return genomes
 
 
 @compiled
 def _creep(
-    genomes: Bytes, offsets: Int64s, symbols: Int32s, scale: Scale, rate: float, streams: Streams
+    genomes: Bytes, offsets: Int64s, symbols: Int32s, scale: Scale, rate: float, most: float, streams: Streams
 ) -> None:
     for i in range(genomes.shape[0]):
-        for k in range(min(offsets[i + 1] - offsets[i], genomes.shape[1])):
+        read = min(offsets[i + 1] - offsets[i], genomes.shape[1])
+        numbers = 0
+        for k in range(read):
+            numbers += scale.numeric[symbols[offsets[i] + k]]
+        chance = min(rate, most / max(numbers, 1))
+        for k in range(read):
             symbol = symbols[offsets[i] + k]
-            if scale.numeric[symbol] and uniform(streams[i]) < rate:
+            if scale.numeric[symbol] and uniform(streams[i]) < chance:
                 first, n = scale.first[symbol], scale.first[symbol + 1] - scale.first[symbol]
                 codon = int(genomes[i, k])
                 step = 1 - 2 * below(streams[i], 2)
@@ -152,8 +161,8 @@ def _creep(
 class Duplicate:
     """A subtree comes to stand twice, one after the other, where the grammar has a production for that.
 
-    A robot that does the same twice mostly drives as before, and what follows may change one copy and keep the other: gene
-    duplication (Ohno 1970; in GE O'Neill and Ryan, IEEE T-EC 5(4), 2001, who copy codons wherever they stand).
+    A robot that does the same twice mostly drives as before, and what follows may change one copy and keep the other:
+    gene duplication (Ohno 1970; in GE O'Neill and Ryan, IEEE T-EC 5(4), 2001, who copy codons wherever they stand).
 
     Attributes
     ----------

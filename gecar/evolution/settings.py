@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -50,14 +51,19 @@ class EvolutionSettings(BaseModel):
         Probability of a codon to be drawn anew.
     creep_rate
         Probability of a used codon that chooses a number to step to a neighbouring one.
+    creep_most
+        Numbers of a child that step, on average, at most.
     duplicates
         ``kept``; or bred again, up to `attempts` times, where the same program is already in the
         ``generation``, or was scored before in the ``run``.
     attempts
         How often a duplicate is bred again.
     restart_after
-        Generations without a better program once one succeeds, after which a new population begins; the best so far
-        stays the run's result. 0: never.
+        Generations without a better program, once one succeeds, after which the population gives way to another; the
+        best so far stays the run's result. 0: never.
+    restart
+        What it gives way to. ``random``: a first population. ``grown``: that once, so that two beginnings compete, and
+        from then on the best programs so far with one of their subtrees doubled: they grow from what they can do.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -76,9 +82,11 @@ class EvolutionSettings(BaseModel):
     mutation: Literal["codon", "used_codon", "one_used_codon", "renew"] = "codon"
     mutation_rate: Rate = 0.05
     creep_rate: Rate = 0.0
+    creep_most: float = Field(math.inf, gt=0.0)
     duplicates: Literal["kept", "generation", "run"] = "kept"
     attempts: int = Field(10, ge=1, le=1_000)
     restart_after: int = Field(0, ge=0, le=1_000_000)
+    restart: Literal["random", "grown"] = "random"
 
     @model_validator(mode="after")
     def _fits(self) -> EvolutionSettings:

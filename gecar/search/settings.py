@@ -31,7 +31,7 @@ class Settings(EvolutionSettings):
 
     checkpoint_credit: bool = False
     draws: int = Field(1, ge=1, le=1_000)
-    arrival_share: Rate = 0.97
+    arrival_share: Rate = 0.95
 
     @property
     def needs_arrivals(self) -> bool:
@@ -51,7 +51,9 @@ PRESETS = {
         mutation="used_codon",
         mutation_rate=0.05,
         creep_rate=0.3,
-        restart_after=25,
+        creep_most=2.0,
+        restart_after=10,
+        restart="grown",
         draws=16,
     ),
 }

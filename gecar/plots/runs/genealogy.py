@@ -19,17 +19,18 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, ScalarFormatter
 
-from gecar.evolution.lineage import CREEP, CROSSOVER, MUTATION, Lineage, Member
+from gecar.evolution.lineage import CREEP, CROSSOVER, DUPLICATION, MUTATION, Lineage, Member
 from gecar.language.program import Program
 from gecar.plots.runs.convergence import UNSOLVED
 from gecar.plots.style import INK, PAPER, SOFT, VERMILION, headline, look, new_figure
 from gecar.results.arrival import with_share
 
-OPERATORS = {CROSSOVER: "crossover", MUTATION: "mutation", CREEP: "creep"}
+OPERATORS = {CROSSOVER: "crossover", DUPLICATION: "duplication", MUTATION: "mutation", CREEP: "creep"}
 MAX_STEPS = 24
 """Most steps listed, the latest ones."""
 _MARKS = {
     CROSSOVER: ("s", 10.0),
+    DUPLICATION: ("D", 8.5),
     MUTATION: ("o", 7.0),
     CREEP: ("^", 4.5),
 }  # so that all can be seen in one place
