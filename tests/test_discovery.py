@@ -275,8 +275,7 @@ def test_a_real_motor_is_predicted_within_a_hundredth() -> None:
     held = ["step_+040", "step_-020", "step_-100"]
     angle = discover(read_case(SHARED / "real" / "ev3_motor_a"), held).judgement.channels["left_angle_deg"]
     assert angle.before > 0.5
-    # 0.0074 with Coulomb friction, too: a candidate, as windows of what is set aside are predicted worse with it.
-    assert angle.after < 0.011
+    assert angle.after < 0.009
 
 
 def test_a_verdict_prints_and_plots_itself() -> None:

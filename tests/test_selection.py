@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linear_case import EV3, bumps, linear, linear_problem
+from linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
 
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.prove.confirmation import confirmed
@@ -15,6 +15,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.screening import candidate_steps
+from gecar.reality.selection.share import share_asked_for
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import table
 
@@ -126,6 +127,46 @@ def test_an_effect_that_gains_nothing_on_recordings_set_aside_is_a_candidate() -
     assert proof.explained.taken.effects == (TRACK,)
     assert proof.explained.unexplained
     assert proof.explained.steps[0].holdout_gain > 0.0
+
+
+def set_aside(shares: list[float]) -> LinearResiduals:
+    """Return recordings that ask for other shares of 3 sizes of an effect, one a recording."""
+    held = linear({VISCOUS: 3.0}, RESPONSES, seed=5)
+    lasting = np.repeat(np.array(shares) - 1.0, len(held.noise) // len(shares))
+    return replace(held, noise=held.noise + 3.0 * lasting * RESPONSES[VISCOUS])
+
+
+@pytest.mark.parametrize(
+    ("shares", "gains", "kept"),
+    [
+        (
+            [0.1, 0.4, 0.6, 0.6],
+            False,
+            True,
+        ),  # one recording tips the sum; half of it is asked for, surely not none
+        ([-1.5, 0.5, 1.5, 2.5], True, False),  # the sum is a toss of recordings that disagree
+        ([0.2, 0.2, 0.2, 0.2], False, False),  # surely too little for the size that was fitted
+    ],
+)
+def test_a_gain_on_recordings_set_aside_is_judged_beside_its_own_spread(
+    shares: list[float], gains: bool, kept: bool
+) -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    proof = confirmed(explained, set_aside(shares))  # type: ignore[arg-type]
+    step = (*proof.explained.steps, *proof.candidates)[0]
+    assert (step.holdout_gain > 0.0) == gains
+    assert bool(proof.explained.steps) == kept
+
+
+def test_bounds_of_a_share_hold_the_truth_where_residuals_are_correlated() -> None:
+    """Errors that last a second; 5 % of lower bounds, and as many upper ones, may miss."""
+    change, still = bumps(1, 3, 1.0), linear({}, RESPONSES, count=3).index
+    missed = np.zeros(2)
+    for seed in range(400):
+        errors = np.repeat(bumps(1000 + seed, 3, 1.0), 2)[: len(change)]
+        share = share_asked_for(still, errors + 0.4 * change, errors - 0.6 * change)
+        missed += share.low > 0.4, share.high < 0.4
+    assert np.all(missed / 400 < 0.09)
 
 
 def test_taking_an_effect_out_restores_the_known_robot_s_value() -> None:

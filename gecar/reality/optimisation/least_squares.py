@@ -33,6 +33,11 @@ def weights(errors: Array) -> Array:
     return 1.0 / np.sqrt(1.0 + (errors / KNEE) ** 2)
 
 
+def curvatures(errors: Array) -> Array:
+    """Return the second derivatives of each residual's cost."""
+    return (1.0 + (errors / KNEE) ** 2) ** -1.5
+
+
 @dataclass(frozen=True)
 class Minimum:
     """Where a minimisation ended.

@@ -1,15 +1,21 @@
-"""Whether each effect gains on the recordings set aside, against the others refitted without it."""
+"""Whether the recordings set aside ask for each effect, beside the others refitted without it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
 
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.model_tolerance import without_tolerated
+from gecar.reality.selection.share import Share, share_asked_for
 from gecar.reality.selection.stepwise import Explanation, is_unexplained
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -19,9 +25,9 @@ class Confirmation:
     Attributes
     ----------
     explained
-        The explanation with the effects that gain there; each step has its ``holdout_gain``.
+        The explanation with the effects asked for there; each step has its ``holdout_gain``.
     candidates
-        Effects that do not: proved where they were fitted, and no findings.
+        Effects that are not: proved where they were fitted, and no findings.
     """
 
     explained: Explanation
@@ -29,7 +35,10 @@ class Confirmation:
 
 
 def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
-    """Drop, one by one, the effects without which recordings set aside fit as well, and refit the others.
+    """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
+
+    They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
+    it was fitted, predicts worse than none (`share_asked_for`).
 
     Parameters
     ----------
@@ -40,18 +49,23 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """
     candidates = list[Step]()
     while explained.steps and held.recordings:
-        with_all = _held_cost(explained, held, explained.taken)
-        steps = [
-            replace(step, holdout_gain=_held_cost(explained, held, _without(explained, step)) - with_all)
-            for step in explained.steps
-        ]
-        explained = replace(explained, steps=tuple(steps))
-        worst = min(steps, key=lambda step: step.holdout_gain)
-        if worst.holdout_gain > 0.0:
+        judged = [_judged(explained, held, step) for step in explained.steps]
+        explained = replace(explained, steps=tuple(step for step, _ in judged))
+        worst, share = min(judged, key=lambda pair: pair[1].margin)
+        if share.margin > 0.0:
             break
         candidates.append(worst)
         explained = dropped(explained, worst)
     return Confirmation(explained, tuple(candidates))
+
+
+def _judged(explained: Explanation, held: Residuals, step: Step) -> tuple[Step, Share]:
+    """Return a step with what it gains on recordings set aside, and the share of it they ask for."""
+    without, with_all = (
+        _held_errors(explained, held, model) for model in (_without(explained, step), explained.taken)
+    )
+    share = share_asked_for(held.index, without, with_all)
+    return replace(step, holdout_gain=cost(without) - cost(with_all)), share
 
 
 def dropped(explained: Explanation, step: Step) -> Explanation:
@@ -67,7 +81,7 @@ def _without(explained: Explanation, step: Step) -> Model:
     return explained.problem.estimator.fit(rest, explained.taken.values)
 
 
-def _held_cost(explained: Explanation, held: Residuals, model: Model) -> float:
+def _held_errors(explained: Explanation, held: Residuals, model: Model) -> Array:
     if explained.problem.clocks_fitted and not held.sensor:
-        return with_fitted_clocks(held, model.physics)[1]
-    return cost(held.errors(model.physics))
+        held = with_fitted_clocks(held, model.physics)[0]
+    return held.errors(model.physics)

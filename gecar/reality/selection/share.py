@@ -1,0 +1,93 @@
+"""The share of an effect, as it was fitted, that recordings ask for: 1 where it is right, 0 where it is absent.
+
+The residuals of two models, without the effect and with it, are mixed; the share is the mixture that costs least
+(forecast encompassing: the model without encompasses the one with where the share is 0). Half squares cost as much at 0
+as at 1 where the share is 1/2; below that the effect as fitted predicts worse than none.
+
+A difference of log-likelihoods has no scale of its own where residuals are correlated: one error that lasts counts in
+every sample. The share has one: its standard error, from the scores' sums over half-second spans and their own
+autocorrelation, however long that lasts; and the spans that are as good as independent are its degrees of freedom.
+
+Sources: Davidson and MacKinnon, Econometrica 49 (1981) 781 (J test); Harvey, Leybourne, Newbold, J. Business and
+Economic Statistics 16 (1998) 254 (its use on forecasts, with Student's t); Newey and West, Econometrica 55 (1987) 703;
+Geyer, Statistical Science 7 (1992) 473 (autocovariances summed while they are positive).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from gecar.reality.noise.excess_energy import SPAN_S
+from gecar.reality.optimisation.least_squares import curvatures, weights
+from gecar.reality.replay.channels import ResidualIndex
+from gecar.reality.selection.thresholds import SIGNIFICANCE
+
+Array = npt.NDArray[np.float64]
+
+AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an effect as without
+ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share with its two one-sided bounds, each at the level `SIGNIFICANCE`."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def margin(self) -> float:
+        """By how much it passes: surely more than none is asked for, and not surely so little that none is better."""
+        return min(self.low, self.high - AS_GOOD_WITHOUT)
+
+
+NONE = Share(0.0, 0.0, 0.0)
+
+
+def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) -> Share:
+    """Return the share of an effect that recordings ask for; `NONE` where it changes nothing in them.
+
+    Parameters
+    ----------
+    index
+        Where the residuals come from.
+    without, with_effect
+        Whitened residuals of the two models, shape (n,).
+    """
+    change = without - with_effect
+    if not np.any(change):
+        return NONE
+    value = 0.0
+    for _ in range(ROUNDS):
+        errors = without - value * change
+        w = weights(errors)
+        move = float(np.sum(w * errors * change) / np.sum(w * change * change))
+        value += min(max(move, -LARGEST_MOVE), LARGEST_MOVE)
+        if abs(move) < CLOSE:
+            break
+    errors = without - value * change
+    variance, spans = _variance_of_sum(index, weights(errors) * errors * change)
+    deviation = np.sqrt(variance) / float(np.sum(curvatures(errors) * change * change))
+    reach = float(student.ppf(1.0 - SIGNIFICANCE, max(spans - 1.0, 1.0)) * deviation)
+    return Share(value, value - reach, value + reach)
+
+
+def _variance_of_sum(index: ResidualIndex, scores: Array) -> tuple[float, float]:
+    """Return the variance of the scores' sum, and how many spans would have it were they independent."""
+    series = []
+    for number in np.unique(index.recording):
+        own = index.recording == number
+        series.append(np.bincount((index.t_s[own] / SPAN_S).astype(int), scores[own]))
+    alone = sum(float(s @ s) for s in series)
+    variance = alone
+    for lag in range(1, max(len(s) for s in series)):
+        covariance = sum(float(s[:-lag] @ s[lag:]) for s in series if len(s) > lag)
+        if covariance <= 0.0:
+            break
+        variance += 2.0 * covariance
+    return variance, sum(map(len, series)) * alone / max(variance, 1e-300)
