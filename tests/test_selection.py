@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
+from scipy.signal import lfilter
 
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import stepwise
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
@@ -19,6 +21,7 @@ from gecar.reality.selection.share import share_asked_for
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import table
 
+YAW_RATE = CHANNELS.index("yaw_rate")
 VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
 RESPONSES = {VISCOUS: bumps(1, 4, 1.0), INERTIA: bumps(2, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
 
@@ -30,6 +33,29 @@ def test_white_noise_has_no_excess_energy_and_a_slow_misfit_has_all_of_its_own()
     assert abs(np.mean(drawn)) < 4.0 * np.std(drawn) / np.sqrt(200)
     misfit = np.repeat(rng.normal(0.0, 3.0, 2400 // 300), 300)
     assert blocks.excess_energy(misfit) == pytest.approx(np.sum(misfit**2) - blocks.count)
+
+
+def gyro_blocks(count: int = 4) -> Blocks:
+    index = linear({}, RESPONSES, count=count).index
+    return Blocks(replace(index, channel=np.full_like(index.channel, YAW_RATE)))
+
+
+@pytest.mark.parametrize("size", [0.4, 0.6, -0.55])
+def test_a_misfit_alike_in_every_block_is_not_taken_for_noise(size: float) -> None:
+    rng, blocks = np.random.default_rng(0), gyro_blocks()
+    energy = blocks.excess_energy(size + rng.normal(size=2400)) / blocks.count
+    assert energy > 0.7 * 15.0 * size**2  # a block holds 15 samples
+
+
+@pytest.mark.parametrize("lasting_s", [0.0, 0.02, 0.04])
+def test_noise_correlated_over_a_block_has_no_excess_energy(lasting_s: float) -> None:
+    rng, blocks = np.random.default_rng(0), gyro_blocks()
+    decay = np.exp(-0.01 / lasting_s) if lasting_s else 0.0
+    drawn = rng.normal(0.0, np.sqrt(1.0 - decay**2), (100, 2400))
+    noise = lfilter([1.0], [1.0, -decay], drawn, axis=1)
+    energies = [blocks.excess_energy(errors) / blocks.count for errors in noise]
+    assert np.mean(energies) < 0.3
+    assert np.quantile(energies, 0.95) < 0.7  # the floor of motion
 
 
 def test_screening_ranks_the_cause_first() -> None:

@@ -14,6 +14,7 @@ SPAN_S = 0.5  # spans whose signs the null distribution draws
 WHITE = (*ENCODERS, REFLECTION)  # channels whose noise is white: encoders round, readings are mostly clipped
 CHI_SQUARE_MEDIAN = 0.455  # of a chi-square with one degree of freedom
 LARGEST_INFLATION = 6.0  # noise correlated over a whole block
+LASTING_S = 1.0  # noise a channel has in common with itself so much later is none: a misfit lasts
 CLIP = 30.0
 
 
@@ -45,6 +46,7 @@ class Blocks:
         self.recording = np.zeros(self.count, np.int64)
         self.recording[self._of] = index.recording
         self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
+        self._later = self._blocks_later(round(LASTING_S / BLOCK_S))
 
     def excess_energy(self, errors: Array, inflation: Array | None = None) -> float:
         """Return the energy of block means above what noise would leave.
@@ -56,15 +58,15 @@ class Blocks:
         inflation
             As `inflation` returns it; default: that of these residuals.
         """
-        return float(np.sum(self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), inflation)))
+        return float(np.sum(self._above(self.sums(np.clip(errors, -CLIP, CLIP)), inflation)))
 
     def excess_by_block(self, errors: Array) -> Array:
         """Return each block's excess energy, in variances of its mean, shape (blocks,); 0 on average for noise."""
-        return self._above(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))), None)
+        return self._above(self.sums(np.clip(errors, -CLIP, CLIP)), None)
 
     def excess_energy_of_sums(self, sums: Array) -> float:
         """Return the excess energy of residuals of which only each block's sum is known, shape (blocks,)."""
-        return float(np.sum(self._above(self._energy(sums), None)))
+        return float(np.sum(self._above(sums, None)))
 
     def sums(self, values: Array) -> Array:
         """Return each block's sum of values, shape (blocks,)."""
@@ -73,26 +75,39 @@ class Blocks:
     def inflation(self, errors: Array) -> Array:
         """Return the variance inflation of each channel's block means, shape (channels,); 1 for white noise.
 
-        Correlated noise of a sensor shows in every block, missing physics in some. So the typical (median) block tells
-        the noise. Encoders round, and the colour sensor mostly reads even floor, clipped: theirs is taken for white.
+        Correlated noise of a sensor shows in every block, missing physics in some: the typical (median) block tells the
+        noise. A misfit may show in every block, too, but it lasts. So the typical difference of two blocks `LASTING_S`
+        apart tells the noise as well, and the smaller counts. Encoders round, and the colour sensor mostly reads even
+        floor, clipped: theirs is taken for white.
         """
-        return self._inflation(self._energy(self.sums(np.clip(errors, -CLIP, CLIP))))
+        return self._inflation(self.sums(np.clip(errors, -CLIP, CLIP)))
 
-    def _above(self, energy: Array, inflation: Array | None) -> Array:
-        expected = (self._inflation(energy) if inflation is None else inflation)[self._channel]
-        above: Array = energy / expected - 1.0
+    def _above(self, sums: Array, inflation: Array | None) -> Array:
+        expected = (self._inflation(sums) if inflation is None else inflation)[self._channel]
+        above: Array = sums**2 / self.samples / expected - 1.0
         return above
 
-    def _inflation(self, energy: Array) -> Array:
+    def _inflation(self, sums: Array) -> Array:
+        energy, means = sums**2 / self.samples, sums / self.samples
+        first, later = self._later
+        changes = (means[later] - means[first]) ** 2 / (1.0 / self.samples[later] + 1.0 / self.samples[first])
         out = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
             if channel not in WHITE:
-                typical = np.median(energy[self._channel == channel]) / CHI_SQUARE_MEDIAN
-                out[channel] = np.clip(typical, 1.0, LARGEST_INFLATION)
+                typical = [np.median(energy[self._channel == channel])]
+                change = changes[self._channel[first] == channel]
+                if len(change):
+                    typical.append(np.median(change))
+                out[channel] = np.clip(min(typical) / CHI_SQUARE_MEDIAN, 1.0, LARGEST_INFLATION)
         return out
 
-    def _energy(self, sums: Array) -> Array:
-        return sums**2 / self.samples
+    def _blocks_later(self, lag: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """Return pairs of blocks of one recording and channel that lie so many blocks apart."""
+        place = (self.recording * len(CHANNELS) + self._channel) * 10_000_000 + (self.t_s / BLOCK_S).astype(
+            int
+        )
+        _, first, later = np.intersect1d(place + lag, place, return_indices=True)
+        return first, later
 
 
 def _folds(index: ResidualIndex) -> npt.NDArray[np.int32]:
