@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +48,12 @@ class Estimator:
     ) -> Callable[[Array], Array]:
         """Return the function that fits minimise."""
         return lambda z: self.residuals.errors(parameters.physics(z)) - tolerated
+
+    def trial(self, model: Model, effect: str) -> Callable[[Mapping[str, float]], Array]:
+        """Return the function from values of one more effect, by label, to a model's residuals under it."""
+        parameters = free(self.robot, (*model.effects, effect))
+        residual = self.residual(parameters, model.tolerated)
+        return lambda values: residual(parameters.vector({**model.values, effect: values}))
 
     def fit(
         self,

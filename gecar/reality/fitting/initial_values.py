@@ -28,6 +28,7 @@ SPEED_OVER_S = 0.1
 _SIZES = (3.0, 12.0)  # in steps worth a name
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
+PATCH_RADII_M = (0.1, 0.15, 0.2, 0.3)
 
 
 def initial_values(
@@ -52,6 +53,27 @@ def initial_values(
     if effect.scan:
         return list(_SCANS[effect.scan](robot, recordings, errors))
     return list(_both_sides(effect_id, robot))
+
+
+def responses(
+    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> Iterator[Array]:
+    """Yield what residuals do in every direction that a search from these starting values looks in, shape (n, k).
+
+    A single column is an effect at certain values, less nothing: residuals fall by a multiple of it, 0 or more. Several
+    are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much.
+    """
+    effect = BY_ID[effect_id]
+    bare = errors({})
+    if effect.scan == "shaft cycles":
+        yield from (-basis for _, _, basis in _ripples(robot, recordings, errors))
+        return
+    values: Iterable[Values] = ()
+    if effect.scan == "floor cells":
+        values = (_patch(*cell, radius) for cell in _cells(recordings) for radius in PATCH_RADII_M)
+    elif effect.starts or effect.scan:
+        values = initial_values(effect_id, robot, recordings, errors)
+    yield from ((bare - errors(each))[:, None] for each in values)
 
 
 def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
@@ -105,17 +127,10 @@ def _shaft_cycles(
     Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
     either shaft do, and least squares gives both phases at once.
     """
-    turned = max(_turned(r, robot) for r in recordings)
-    size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
-    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
+    bare = errors({})
     w, least = np.sqrt(weights(bare)), cost(bare)
-    for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
-        if cycles * turned < LEAST_CYCLES:
-            continue
-        pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
-        sines, sine, cosines, cosine = (w * (errors(_rippled(cycles, *p, size)) - bare) for p in pairs)
-        basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
-        a, b, c, d = -np.linalg.lstsq(basis, w * bare, rcond=None)[0]
+    for cycles, size, basis in _ripples(robot, recordings, errors):
+        a, b, c, d = -np.linalg.lstsq(w[:, None] * basis, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
         phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
         # Least squares asks for too little: a ripple runs out of step with the simulation.
@@ -124,6 +139,21 @@ def _shaft_cycles(
             gain, other = (least - cost(errors(values)) for values in (found, opposite))
             if other < PHASE_COUNTS * gain:
                 yield found
+
+
+def _ripples(
+    robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+) -> Iterator[tuple[int, float, Array]]:
+    """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
+    turned = max(_turned(r, robot) for r in recordings)
+    size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
+    bare = errors({})
+    for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
+        if cycles * turned >= LEAST_CYCLES:
+            pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
+            sines, sine, cosines, cosine = (errors(_rippled(cycles, *p, size)) - bare for p in pairs)
+            basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
+            yield cycles, size, basis
 
 
 def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[str, float]:
@@ -151,17 +181,10 @@ def _wheel_angles(recording: Recording) -> Array:
 
 def _floor_cells(recordings: Sequence[Recording], errors: Callable[[Values], Array]) -> Iterator[Values]:
     """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
-    places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
-    if not len(places):
-        return
-    cells = np.unique(np.round(places / PATCH_PITCH_M).astype(int), axis=0) * PATCH_PITCH_M
-    cells = cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))]
-    tried = [{"radius_m": 0.1, "x_m": float(x), "y_m": float(y), "coefficient": 0.15} for x, y in cells]
+    tried = [_patch(x, y, PATCH_RADII_M[0]) for x, y in _cells(recordings)]
     tried.sort(key=lambda values: cost(errors(values)))
     half = 0.5 * PATCH_PITCH_M
-    for values, radius, grip in itertools.product(
-        tried[:BEST_CELLS], (0.1, 0.15, 0.2, 0.3), (0.06, 0.15, 0.3)
-    ):
+    for values, radius, grip in itertools.product(tried[:BEST_CELLS], PATCH_RADII_M, (0.06, 0.15, 0.3)):
         for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
             yield {
                 "radius_m": radius,
@@ -169,6 +192,22 @@ def _floor_cells(recordings: Sequence[Recording], errors: Callable[[Values], Arr
                 "x_m": values["x_m"] + dx,
                 "y_m": values["y_m"] + dy,
             }
+
+
+def _cells(recordings: Sequence[Recording]) -> list[tuple[float, float]]:
+    """Return places on a grid where the robot has been [m]; none where no camera looked."""
+    places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
+    if not len(places):
+        return []
+    cells = np.unique(np.round(places / PATCH_PITCH_M).astype(int), axis=0) * PATCH_PITCH_M
+    return [
+        (float(x), float(y))
+        for x, y in cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))]
+    ]
+
+
+def _patch(x_m: float, y_m: float, radius_m: float) -> dict[str, float]:
+    return {"radius_m": radius_m, "x_m": x_m, "y_m": y_m, "coefficient": 0.15}
 
 
 def _top_speeds(robot: Robot) -> Iterator[Values]:

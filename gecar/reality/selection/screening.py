@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,18 +94,12 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
     """Score an effect without fitting it: by its sensitivities at the model, and by trying its starting values."""
     estimator = problem.estimator
     parameters = free_parameters(estimator.robot, (*model.effects, effect))
-    residual = estimator.residual(parameters, model.tolerated)
-
-    def vector(values: Mapping[str, float]) -> Array:
-        return parameters.vector({**model.values, effect: values})
-
-    values = initial_values(
-        effect, estimator.robot, problem.recordings, lambda tried: residual(vector(tried))
-    )
-    starts = [vector(each) for each in values]
-    if not starts:
+    trial = estimator.trial(model, effect)
+    values = initial_values(effect, estimator.robot, problem.recordings, trial)
+    if not values:
         return None
-    found = np.array([cost(residual(z)) for z in starts])
+    starts = [parameters.vector({**model.values, effect: each}) for each in values]
+    found = np.array([cost(trial(each)) for each in values])
     order = np.argsort(found)
     search = BY_ID[effect].search or USUAL
     kept = _apart([starts[k] for k in order], search.restarts, search.apart)
