@@ -22,6 +22,7 @@ from gecar.files import write_whole
 from gecar.report.table import piped, seconds
 from gecar.results.arrival import percent
 from gecar.results.cells import Cell
+from gecar.results.quantile import quantile
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.search.settings import PRESETS
 from gecar.world.course.course import list_courses
@@ -117,7 +118,7 @@ def _figures(cell: Cell) -> list[str]:
 
 
 def _count(spent: npt.NDArray[np.float64]) -> str:
-    median = float(np.quantile(spent, 0.5, method="higher"))
+    median = float(quantile(spent, 0.5))
     return f"{median:,.0f}" if np.isfinite(median) else "-"
 
 

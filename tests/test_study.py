@@ -5,8 +5,11 @@ import pytest
 
 from gecar.errors import InputError
 from gecar.parallel.run_parallel import Workplace
+from gecar.plots.runs.compare_runs import compare_runs
+from gecar.report.runs import summaries
 from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
 from gecar.results.cells import cells_of, difference_p
+from gecar.results.fitness_table import Move
 from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
 from gecar.results.study import Axis, Study, StudyFolder, read_study
 from gecar.results.study_runs import perform, perform_all
@@ -143,6 +146,19 @@ def test_cells_are_contrasted_as_the_field_does():
 
 def test_holms_correction_is_that_of_his_paper():
     assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_an_even_number_of_seeds_has_one_median_in_tables_pictures_and_reports():
+    times, runs = (10.0, 20.0, 30.0, 1e4), study(seeds=(1, 2, 3, 4)).plan()
+    cell = cells_of(runs, [record(run, times[run.config.seed - 1]) for run in runs])[0]
+    results = [{"fitness_s": t, "solved": t < 1e4, "evaluations": 1} for t in times]
+    histories = [{"evaluations": np.ones(1), "best": np.array([t])} for t in times]
+    drawn = compare_runs({"four": histories}).axes[0].get_lines()[0].get_ydata()
+    moved = Move("search", "best_s", list(times), list(times[:3]), matters=True)
+    assert cell.figures()["median_s"] == 30.0
+    assert summaries(["four"] * 4, results)["four"]["median_s"] == 30.0
+    assert drawn[-1] == 30.0
+    assert moved.percent == pytest.approx(100.0 * (20.0 - 30.0) / 30.0)
 
 
 def test_a_medians_interval_holds_it_and_narrows_with_more_runs():

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from gecar.results.arrival import median_share, percent, share_of, with_share
 from gecar.results.config import Config
+from gecar.results.quantile import quantile
 from gecar.world.course.course import load_course
 
 _NAMES = {"crossover_rate": "crossover", "mutation_rate": "mutation"}
@@ -58,7 +59,7 @@ def _summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "runs": len(times),
         "solved": len(solved),
         "best_s": float(times.min()),
-        "median_s": float(np.quantile(times, 0.5, method="higher")),
+        "median_s": float(quantile(times, 0.5)),
         "worst_s": float(times.max()),
         "mean_solved_s": float(solved.mean()) if len(solved) else float("nan"),
         "arrives_share": median_share(results),

@@ -12,6 +12,7 @@ from scipy import stats
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.results.arrival import median_share
+from gecar.results.quantile import quantile
 from gecar.results.study import Planned
 
 Floats = npt.NDArray[np.float64]
@@ -67,7 +68,7 @@ class Cell:
 
     def quantile_s(self, share: float) -> float:
         """Return a quantile of the times [s]; a run without GOAL counts as slower than any."""
-        return float(np.quantile(self.times_s, share, method="higher")) if self.records else float("nan")
+        return float(quantile(self.times_s, share)) if self.records else float("nan")
 
     def figures(self) -> dict[str, Any]:
         """Sum up: runs, solved and times [s]; inf where too few runs reached GOAL, nan where none is finished."""

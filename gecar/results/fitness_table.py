@@ -23,6 +23,7 @@ from gecar.language.program import parse_program
 from gecar.results.arrival import share_of, shares
 from gecar.results.config import Config, configure
 from gecar.results.provenance import versions
+from gecar.results.quantile import quantile
 from gecar.results.run import load_task
 from gecar.results.study_runs import perform
 from gecar.world.rollout import simulate
@@ -262,7 +263,7 @@ def _matters(move: Move, exact: bool) -> bool:
 
 def _typical(value: Any) -> float | None:
     if isinstance(value, list) and value:
-        return float(np.median(value))
+        return float(quantile(value, 0.5))
     return float(value) if isinstance(value, int | float) else None
 
 

@@ -11,6 +11,7 @@ from scipy import stats
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.results.cells import Cell
+from gecar.results.quantile import quantile
 
 Floats = npt.NDArray[np.float64]
 
@@ -66,7 +67,7 @@ def median_interval(values: Floats, level: float = 0.95) -> tuple[float, float]:
         Its coverage, 0..1.
     """
     draws = np.random.default_rng(0).integers(0, len(values), (RESAMPLES, len(values)))
-    medians = np.sort(np.quantile(values[draws], 0.5, axis=1, method="higher"))
+    medians = np.sort(quantile(values[draws], 0.5, axis=1))
     tail = (1.0 - level) / 2.0
     return float(medians[int(tail * RESAMPLES)]), float(medians[int((1.0 - tail) * RESAMPLES)])
 

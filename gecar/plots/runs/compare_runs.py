@@ -13,6 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from gecar.plots.runs.convergence import UNSOLVED, Reference, draw_references
 from gecar.plots.style import CYCLE, headline, look, new_figure
+from gecar.results.quantile import quantile
 
 Series = npt.NDArray[np.float64]
 History = Mapping[str, Series]
@@ -61,7 +62,7 @@ def _draw_group(
     at = np.unique(np.concatenate([history["evaluations"] for history in histories]))
     best = np.array([_best_at(history, at) for history in histories])
     # A run without GOAL counts as infinitely slow, so its lack pulls the median up and does not drop out.
-    low, middle, high = (_finite(np.quantile(best, q, axis=0, method="lower")) for q in (0.25, 0.5, 0.75))
+    low, middle, high = (_finite(quantile(best, q, axis=0)) for q in (0.25, 0.5, 0.75))
     top.plot(at, middle, color=colour, linestyle=dashes, label=words, drawstyle="steps-post")
     if len(histories) > 1:
         top.fill_between(

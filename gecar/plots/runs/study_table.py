@@ -15,6 +15,7 @@ from gecar.plots.runs.convergence import UNSOLVED
 from gecar.plots.style import BLUE, FAINT, INK, SOFT, VERMILION, headline, look, new_figure
 from gecar.results.arrival import arriving
 from gecar.results.cells import Cell
+from gecar.results.quantile import quantile
 
 Floats = npt.NDArray[np.float64]
 Paper = Mapping[tuple[Any, Any], float]
@@ -136,7 +137,7 @@ def _draw_cell(axes: Axes, cell: Cell, paper_s: float) -> None:
     for run in times:
         axes.step(cell.generation, _finite(run), where="post", color=SOFT, linewidth=0.7, alpha=0.55)
     # A run without GOAL counts as infinitely slow, so its lack pulls the median up and does not drop out.
-    low, middle, high = (_finite(np.quantile(times, q, axis=0, method="lower")) for q in (0.25, 0.5, 0.75))
+    low, middle, high = (_finite(quantile(times, q, axis=0)) for q in (0.25, 0.5, 0.75))
     top = np.where(np.isnan(high), 1e3, high)
     axes.fill_between(cell.generation, low, top, color=BLUE, alpha=0.15, step="post", lw=0)
     axes.step(cell.generation, middle, where="post", color=BLUE, linewidth=2.2, zorder=3)
