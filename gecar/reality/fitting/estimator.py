@@ -107,14 +107,21 @@ class Estimator:
         columns = [self.sensitivities(model, effect) for effect in model.effects]
         return np.concatenate([np.zeros((len(model.errors), 0)), *columns], axis=1)
 
-    def projected(self, model: Model, weighted: Array) -> Array:
-        """Project a model's own parameters out of weighted sensitivities, shape (n, k); what vanishes is dropped."""
-        own = self.own_sensitivities(model) * np.sqrt(weights(model.errors))[:, None]
-        if own.shape[1]:
-            basis = np.linalg.qr(own)[0]
+    def projection(self, model: Model) -> Callable[[Array], Array]:
+        """Return the function that weights sensitivities, shape (n, k), and projects a model's own parameters out.
+
+        What vanishes is dropped.
+        """
+        w = np.sqrt(weights(model.errors))[:, None]
+        basis = np.linalg.qr(self.own_sensitivities(model) * w)[0]
+
+        def projected(slopes: Array) -> Array:
+            weighted = slopes * w
             weighted = weighted - basis @ (basis.T @ weighted)
-        kept: Array = weighted[:, np.sqrt(np.sum(weighted * weighted, axis=0)) > LEAST_NORM]
-        return kept
+            kept: Array = weighted[:, np.sqrt(np.sum(weighted * weighted, axis=0)) > LEAST_NORM]
+            return kept
+
+        return projected
 
     def linear_gain(self, model: Model, effect: str) -> float:
         """Return the gain that sensitivities promise for one more effect: a score test.
@@ -122,7 +129,7 @@ class Estimator:
         Source: Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
         """
         w = np.sqrt(weights(model.errors))
-        g = self.projected(model, self.sensitivities(model, effect) * w[:, None])
+        g = self.projection(model)(self.sensitivities(model, effect))
         if not g.shape[1]:
             return 0.0
         return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.errors)) ** 2))

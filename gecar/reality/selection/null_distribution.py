@@ -11,7 +11,7 @@ from (Davies, Biometrika 74 (1987) 33; the largest score under random signs: Han
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,10 +30,10 @@ def largest_gains(estimator: Estimator, catalogue: Sequence[str], model: Model) 
     """Return the largest gain of any effect on top of a model in every draw, shape (draws,)."""
     spans = int(estimator.blocks.spans.max()) + 1
     signs = estimator.rng.choice((-1.0, 1.0), (DRAWS, spans))
-    best = np.zeros(DRAWS)
+    best, projected = np.zeros(DRAWS), estimator.projection(model)
     for effect in catalogue:
         if effect not in model.effects:
-            for scores, searched in _scores(estimator, model, effect):
+            for scores, searched in _scores(estimator, model, effect, projected):
                 drawn = signs @ scores
                 if (
                     searched and drawn.shape[1] == 1
@@ -43,15 +43,16 @@ def largest_gains(estimator: Estimator, catalogue: Sequence[str], model: Model) 
     return best
 
 
-def _scores(estimator: Estimator, model: Model, effect: str) -> Iterator[tuple[Array, bool]]:
+def _scores(
+    estimator: Estimator, model: Model, effect: str, projected: Callable[[Array], Array]
+) -> Iterator[tuple[Array, bool]]:
     """Yield each span's scores in the directions fitted together, shape (spans, k), and whether they were searched."""
-    w = np.sqrt(weights(model.errors))
-    weighted, of = w * model.errors, estimator.blocks.spans
+    weighted, of = np.sqrt(weights(model.errors)) * model.errors, estimator.blocks.spans
     recordings = [r.recording for r in estimator.residuals.recordings]
     derivatives = [(estimator.sensitivities(model, effect), False)]
     found = responses(effect, estimator.robot, recordings, estimator.trial(model, effect))
     for columns, searched in itertools.chain(derivatives, ((each, True) for each in found)):
-        g = estimator.projected(model, columns * w[:, None])
+        g = projected(columns)
         if g.shape[1]:
             q = np.linalg.qr(g)[0]
             if searched and g.shape[1] == 1:
