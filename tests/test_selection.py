@@ -103,6 +103,40 @@ def test_what_no_effect_explains_is_unexplained() -> None:
     assert explained.unexplained
 
 
+def unlike(response: np.ndarray, seed: int, size: float, count: int = 4) -> np.ndarray:
+    """Return what no effect explains, and least of all one with this response, in any recording."""
+    parts = zip(np.split(bumps(seed, count, size), count), np.split(response, count), strict=True)
+    return np.concatenate([part - (part @ of) / (of @ of) * of for part, of in parts])
+
+
+@pytest.mark.parametrize("size", [1.7, 2.4])  # explained: 75 %, 60 %
+def test_a_cause_beside_what_nothing_explains_is_named_and_the_rest_is_unexplained(size: float) -> None:
+    both = linear({VISCOUS: 3.0}, RESPONSES)
+    both = replace(both, noise=both.noise + unlike(RESPONSES[VISCOUS], 9, size))
+    explained = explain(linear_problem(both))
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert explained.taken.z == pytest.approx([3.0], abs=0.1)
+    assert explained.unexplained
+
+
+def test_an_imitation_of_another_size_in_every_recording_is_not_named() -> None:
+    imitated = np.repeat([2.0, 3.0, 4.0, 3.5], 600) * RESPONSES[VISCOUS]
+    unknown = linear({}, RESPONSES)
+    unknown = replace(unknown, noise=unknown.noise + imitated + unlike(RESPONSES[VISCOUS], 9, 2.0))
+    explained = explain(linear_problem(unknown))
+    assert explained.steps == ()
+    assert explained.unexplained
+
+
+def test_a_twentieth_of_a_loud_case_is_not_left_without_a_word() -> None:
+    loud = linear({VISCOUS: 8.0}, RESPONSES)
+    loud = replace(loud, noise=loud.noise + unlike(RESPONSES[VISCOUS], 9, 1.8))
+    explained = explain(linear_problem(loud))
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert 0.03 < explained.left.excess_energy / explained.problem.known.excess_energy < 0.1
+    assert explained.unexplained
+
+
 def test_effects_with_the_same_response_are_alternatives() -> None:
     twins = {VISCOUS: RESPONSES[VISCOUS], INERTIA: RESPONSES[VISCOUS] + 0.02 * RESPONSES[TRACK]}
     explained = explain(linear_problem(linear({VISCOUS: 3.0}, twins)))

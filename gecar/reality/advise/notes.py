@@ -30,7 +30,7 @@ def notes_on(
         Effects that proved themselves where they were fitted, and were not confirmed.
     """
     notes = [
-        f"{effect} explains recordings it was fitted to, but gains nothing on those set aside, or its interval holds "
+        f"{effect} explains recordings it was fitted to, but those set aside do not ask for it, or its interval holds "
         "its neutral value: a candidate, no finding."
         for effect in candidates
     ]

@@ -9,12 +9,14 @@ import numpy as np
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.share import spread_of_size
 from gecar.reality.selection.thresholds import (
     COMPETING,
     LEAST_INVERSE,
     MAIN_SHARE,
     MORE_SHARE,
     SIGNIFICANCE,
+    STEADY,
     STOPPED,
     WHOLE_SHARE,
 )
@@ -86,3 +88,16 @@ def number_accepted(problem: Problem, steps: Sequence[Step]) -> int:
             accepted = number
         whole_before = whole_before or whole
     return accepted
+
+
+def number_beside_the_unexplained(problem: Problem, steps: Sequence[Step]) -> int:
+    """Return how many steps of a chain are accepted though together they leave much that nothing explains.
+
+    Each must explain a good part of what the others leave, and be of one size in all recordings: imitations are not.
+    """
+    folds = problem.estimator.blocks.folds
+    for number, step in enumerate(steps):
+        steady = spread_of_size(folds, step.base.errors, step.model.errors) < STEADY
+        if not steady or step.drop < MAIN_SHARE * step.energy_before:
+            return number
+    return len(steps)

@@ -9,7 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.selection.acceptance import RUNNERS_UP, candidates, is_worthwhile, number_accepted, proved
+from gecar.reality.selection.acceptance import (
+    RUNNERS_UP,
+    candidates,
+    is_worthwhile,
+    number_accepted,
+    number_beside_the_unexplained,
+    proved,
+)
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.model_tolerance import without_tolerated
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
@@ -21,7 +28,6 @@ from gecar.reality.selection.thresholds import (
     MAIN_SHARE,
     MOST_EFFECTS,
     MOST_ON_BENCH,
-    NEARLY_WHOLE,
     UNEXPLAINED_SHARE,
 )
 from gecar.world.effects import BY_ID
@@ -63,7 +69,8 @@ class Explanation:
 def explain(problem: Problem) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate.
 
-    Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
+    Where they explain nearly all, they are taken; where they do not, those of one size in all recordings. Where it
+    takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
     """
     first = candidate_steps(problem, problem.known) if _worth_fitting(problem, problem.known) else []
     with_clocks = _with_clocks(problem, problem.known, first)
@@ -72,7 +79,10 @@ def explain(problem: Problem) -> Explanation:
     chain = _forward(problem, first)
     if chain.with_clocks is not None:
         return explain(chain.with_clocks)
-    best = _shortest([chain, *_other_beginnings(problem, first, chain)], problem)
+    chains = [chain, *_other_beginnings(problem, first, chain)]
+    if not any(each.steps for each in chains):
+        chains = [each.beside_the_unexplained(problem) for each in chains]
+    best = _shortest(chains, problem)
     tried = (tuple(first), *best.tried[1:])
     taken, steps = _swapped_and_dropped(problem, best.steps, tried)
     left = without_tolerated(problem, taken)
@@ -89,15 +99,20 @@ def is_unexplained(problem: Problem, left: Model) -> bool:
 class _Chain:
     """One forward selection.
 
-    ``steps`` were accepted and end in ``model``; ``nearly`` says whether rejected ones explained nearly all;
-    ``with_clocks`` is the problem to begin anew, where the camera's clocks had to be fitted on the way.
+    Of the ``proved`` steps the first ``steps`` were accepted and end in ``model``; ``with_clocks`` is the problem to
+    begin anew, where the camera's clocks had to be fitted on the way.
     """
 
+    proved: tuple[Step, ...]
     steps: tuple[Step, ...]
     model: Model
     tried: tuple[tuple[Step, ...], ...]
-    nearly: bool
     with_clocks: Problem | None = None
+
+    def beside_the_unexplained(self, problem: Problem) -> _Chain:
+        """Return this with the steps that are accepted though nothing explains the rest."""
+        steps = self.proved[: number_beside_the_unexplained(problem, self.proved)]
+        return replace(self, steps=steps, model=steps[-1].model if steps else self.model)
 
 
 def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
@@ -118,11 +133,9 @@ def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
         stage = tuple(candidate_steps(problem, model))
         with_clocks = _with_clocks(problem, model, stage)
         if with_clocks is not None:
-            return _Chain((), problem.known, (), nearly=False, with_clocks=with_clocks)
+            return _Chain((), (), problem.known, (), with_clocks)
     accepted = tuple(steps[: number_accepted(problem, steps)])
-    before = steps[0].energy_before if steps else 0.0
-    nearly = bool(steps) and before - steps[-1].energy_after > NEARLY_WHOLE * before
-    return _Chain(accepted, accepted[-1].model if accepted else problem.known, tuple(tried), nearly)
+    return _Chain(tuple(steps), accepted, accepted[-1].model if accepted else problem.known, tuple(tried))
 
 
 def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
@@ -131,8 +144,9 @@ def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
-    """Return the chains that begin with a runner-up, where the first chain took several effects or nearly stood."""
-    if not (len(chain.steps) > 1 or (not chain.steps and chain.nearly)):
+    """Return the chains that begin with a runner-up, where the first took several effects, or explained a good part."""
+    part = bool(chain.proved) and chain.proved[0].drop >= MAIN_SHARE * chain.proved[0].energy_before
+    if not (len(chain.steps) > 1 or (not chain.steps and part)):
         return []
     rivals = [
         step for step in first[1:BEGINNINGS] if step.worthwhile and step.gain > COMPETING * first[0].gain

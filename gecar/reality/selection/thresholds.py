@@ -63,10 +63,16 @@ MORE_SHARE = Threshold(
     "share of what is left above the floor one more effect must explain once nearly all is explained",
     "pairs of the 3D engine: a second cause explains 80 to 99 %, an imitation of a model's errors 20 to 50 %",
 )
-NEARLY_WHOLE = Threshold(
-    0.75, "share explained from which a rejected chain is worth another beginning", "hand"
+STEADY = Threshold(
+    0.08,
+    "relative spread over recordings of an effect's size, beside what nothing explains",
+    "10 cases of the 3D engine: causes beside other physics 0.00 to 0.06, imitations of that physics 0.10 to 0.27",
 )
-UNEXPLAINED_SHARE = Threshold(0.1, "share of the excess energy that may be left without a word", _EXAMINED)
+UNEXPLAINED_SHARE = Threshold(
+    0.02,
+    "share of the excess energy that may be left without a word",
+    "laws are off by up to 12 % of an effect's size (`Parameter.model_error`): 1.4 % of its energy",
+)
 
 # -- Tolerance of the model
 TOLERATED = Threshold(0.4, "sizes worth a name by which constants of the robot may be off", _EMPTY)
