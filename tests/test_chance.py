@@ -15,11 +15,13 @@ from gecar.language.program import parse_program
 from gecar.results.arrival import arrives
 from gecar.search.batches import Batches
 from gecar.search.chance import (
+    CHOICE_STEPS_S,
     MARGIN,
     Arrivals,
     add_drives,
     arrivals,
     chosen,
+    drives_at_steps,
     merit_of,
     pool,
     times_at_steps,
@@ -127,6 +129,13 @@ def test_the_reported_share_is_of_200_drives_and_the_steps_are_the_nominal_robot
 
 def test_the_choice_is_made_on_fresh_draws():
     assert chosen(WORLD, [FRAGILE, LEAVES, STEADY], 0.95, 1) == 2
+
+
+def test_a_program_that_owes_its_time_to_one_step_is_not_chosen():
+    fragile, steady = drives_at_steps(WORLD, [FRAGILE, STEADY], (WORLD.step_s, *CHOICE_STEPS_S))
+    assert fragile[0] < steady[0] == pytest.approx(steady.max(), rel=0.02)
+    assert not fragile.max() <= 1.02 * fragile[0]
+    assert chosen(WORLD, [FRAGILE, STEADY], 0.0, 1) == 1
 
 
 def test_merit_orders_by_time_only_what_arrives_often_enough():

@@ -11,6 +11,7 @@ generations are driven again, so that luck does not last.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,10 @@ MARGIN = 1.05
 """How far behind the best so far, in time to GOAL, a program is let go after the first draws."""
 STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 """Steps a result is checked at [s]."""
+CHOICE_STEPS_S = (0.003, 0.0014, 0.0007, 0.00035)
+"""Steps the programs that a result is chosen from are driven at [s]."""
+STEADY = 1.02
+"""How much longer the slowest of these drives may take than the fastest."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -114,18 +119,23 @@ def arrivals(
     return [Arrivals(row) for row in times.reshape(len(programs), draws)]
 
 
+def drives_at_steps(
+    world: World, programs: Sequence[npt.NDArray[np.int32]], steps_s: Sequence[float], seed: int = 0
+) -> Floats:
+    """Return the nominal robot's times to GOAL at other steps [s], inf where it misses it, shape (programs, steps)."""
+    under = joined([replace(world, step_s=step).nominal for step in steps_s])
+    pairs = np.stack(np.divmod(np.arange(len(programs) * len(under)), len(under)), axis=1)
+    summary, _ = Fleet(world).drive(programs, under, pairs, np.full(len(pairs), seed))
+    times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+    return times.reshape(len(programs), len(under))
+
+
 def times_at_steps(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0) -> dict[str, float | None]:
     """Return a program's time to GOAL on the nominal robot at each of `STEPS_S` [s]; None where it misses GOAL."""
-    worlds = [
-        World(world.robot, world.course, step, world.time_limit_s, world.noise, world.engine)
-        for step in STEPS_S
-    ]
-    under = joined([each.nominal for each in worlds])
-    pairs = np.stack([np.zeros(len(worlds)), np.arange(len(worlds))], axis=1)
-    summary, _ = Fleet(world).drive([opcodes], under, pairs, np.full(len(worlds), seed))
+    (times,) = drives_at_steps(world, [opcodes], STEPS_S, seed)
     return {
-        f"{step:g}": float(row["time_s"]) if row["outcome"] == Outcome.GOAL else None
-        for step, row in zip(STEPS_S, summary, strict=True)
+        f"{step:g}": float(time) if np.isfinite(time) else None
+        for step, time in zip(STEPS_S, times, strict=True)
     }
 
 
@@ -139,17 +149,20 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
     """Return which of a search's best programs is best on fresh draws: all on 64, the better quarter on 448 more.
 
     What looks best in a search is partly lucky; these draws are none of the search's, and the result is measured on
-    others again.
+    others again. Programs whose nominal drive takes as long at other steps (`CHOICE_STEPS_S`, none of `STEPS_S` but the
+    world's own) come before those that owe their time to one step.
     """
+    at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
+    unsteady = ~(at_steps.max(axis=1) <= STEADY * at_steps.min(axis=1))
     first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
-    order = np.argsort([merit_of(times, share) for times in first], kind="stable")
+    order = np.lexsort(([merit_of(times, share) for times in first], unsteady))
     left = order[: max(1, (len(order) + 3) // 4)].tolist()
     second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1))
     both = [
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)
     ]
-    return int(left[int(np.argmin([merit_of(times, share) for times in both]))])
+    return int(left[int(np.lexsort(([merit_of(times, share) for times in both], unsteady[left]))[0])])
 
 
 _CHOICE, REPORT = 1_000_003, 1_000_033

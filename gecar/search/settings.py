@@ -31,7 +31,7 @@ class Settings(EvolutionSettings):
 
     checkpoint_credit: bool = False
     draws: int = Field(1, ge=1, le=1_000)
-    arrival_share: Rate = 0.95
+    arrival_share: Rate = 0.96
 
     @property
     def needs_arrivals(self) -> bool:
@@ -43,8 +43,8 @@ PRESETS = {
     "paper": Settings(),
     "random": Settings(mutation="renew", crossover_rate=0.0),
     "better": Settings(
-        population=60,
-        generations=169,
+        population=40,
+        generations=254,
         checkpoint_credit=True,
         crossover="subtree",
         crossover_rate=0.7,
