@@ -148,7 +148,7 @@ def test_duplication_makes_a_subtree_stand_twice_in_a_row() -> None:
     grammar = Mapper(parse_grammar("<a> ::= x | <a><a> | <n>\n<n> ::= 1 | 2 | 3"))
     before = grammar.map(np.array([[1, 0, 2, k % 3, *[0] * 20] for k in range(60)], np.uint8))
     genomes = np.array([[1, 0, 2, k % 3, *[0] * 20] for k in range(60)], np.uint8)
-    after = grammar.map(Duplicate(1.0)(genomes, grammar, spawn(1, 1, 0, 60)))
+    after = grammar.map(Duplicate(1.0, 99)(genomes, grammar, spawn(1, 1, 0, 60)))
     for k in range(60):
         number = before.text(k)[1:]
         assert after.valid[k]
@@ -159,10 +159,10 @@ def test_duplication_makes_a_subtree_stand_twice_in_a_row() -> None:
 def test_duplication_leaves_alone_what_has_no_room_and_what_cannot_stand_twice() -> None:
     full = np.array([[1, 0, 2, 2]], np.uint8)
     grammar = Mapper(parse_grammar("<a> ::= x | <a><a> | <n>\n<n> ::= 1 | 2 | 3"))
-    assert np.array_equal(Duplicate(1.0)(full.copy(), grammar, spawn(1, 1, 0, 1)), full)
+    assert np.array_equal(Duplicate(1.0, 99)(full.copy(), grammar, spawn(1, 1, 0, 1)), full)
     once = Mapper(parse_grammar("<a> ::= <n>y | <n>\n<n> ::= 1 | 2 | 3"))
     genomes = random_genomes(20, 10)
-    assert np.array_equal(Duplicate(1.0)(genomes.copy(), once, spawn(1, 1, 0, 20)), genomes)
+    assert np.array_equal(Duplicate(1.0, 99)(genomes.copy(), once, spawn(1, 1, 0, 20)), genomes)
 
 
 def test_a_tournament_of_five_prefers_the_best_as_often_as_theory_says() -> None:

@@ -53,6 +53,9 @@ class Bred(Generic[P]):
 GROWN = 0.7
 """Probability of a child of a stagnant population that one of its subtrees is doubled; numbers of all may creep."""
 
+LONGEST = 54
+"""Most codons of a program that grew: six conditions of Table 3, 24 lines. Without a limit some had eighteen."""
+
 Drawn = tuple[Bytes, Int32s, Bytes]
 """Genomes, parents and changes, as in `Bred`."""
 
@@ -76,7 +79,10 @@ class Breeder(Generic[P]):
         self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
         self._phenotypes = Phenotypes(mapper, problem)
         self._operators = _operators(settings)
-        self._growth: list[tuple[int, Operator]] = [(DUPLICATION, Duplicate(GROWN)), *_creep(settings)]
+        self._growth: list[tuple[int, Operator]] = [
+            (DUPLICATION, Duplicate(GROWN, LONGEST)),
+            *_creep(settings),
+        ]
 
     def read(self, genomes: Bytes) -> list[Phenotype[P] | None]:
         """Return what genomes derive."""

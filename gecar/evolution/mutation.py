@@ -168,17 +168,29 @@ class Duplicate:
     ----------
     rate
         Probability of each genome that is valid and has room.
+    longest
+        Most codons a derivation may read afterwards; one that would read more stays as it is.
     """
 
     rate: float
+    longest: int
 
     def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
         """Return the children (genomes, codons)."""
         mapped = mapper.map(genomes)
         whole = mapped.valid & (mapped.used <= genomes.shape[1])
+        longest = min(self.longest, genomes.shape[1])
         twice = _twice(mapper.grammar)
         _duplicate(
-            genomes, whole, mapped.offsets, mapped.symbols, mapped.subtree_ends, twice, self.rate, streams
+            genomes,
+            whole,
+            mapped.offsets,
+            mapped.symbols,
+            mapped.subtree_ends,
+            twice,
+            self.rate,
+            longest,
+            streams,
         )
         return genomes
 
@@ -203,6 +215,7 @@ def _duplicate(
     ends: Int32s,
     twice: Int32s,
     rate: float,
+    longest: int,
     streams: Streams,
 ) -> None:
     codons = genomes.shape[1]
@@ -221,7 +234,7 @@ def _duplicate(
             skip -= twice[symbols[first + begin]] >= 0
             begin += 1
         length = ends[first + begin] - begin
-        if used + 1 + length <= codons:
+        if used + 1 + length <= longest:
             for k in range(codons - 1, begin, -1):
                 genomes[i, k] = genomes[i, k - 1 - length] if k > begin + length else genomes[i, k - 1]
             genomes[i, begin] = twice[symbols[first + begin]]

@@ -32,6 +32,9 @@ STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 """Steps a result is checked at [s]."""
 CHOICE_STEPS_S = (0.003, 0.0014, 0.0007, 0.00035)
 """Steps the programs that a result is chosen from are driven at [s]."""
+AS_GOOD = 1.01
+"""How much slower a shorter program may be to be chosen before the best: lexicographic parsimony in buckets (Luke and
+Panait, GECCO 2002)."""
 STEADY = 1.02
 """How much longer the slowest of these drives may take than the fastest."""
 
@@ -150,7 +153,7 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
 
     What looks best in a search is partly lucky; these draws are none of the search's, and the result is measured on
     others again. Programs whose nominal drive takes as long at other steps (`CHOICE_STEPS_S`, none of `STEPS_S` but the
-    world's own) come before those that owe their time to one step.
+    world's own) come before those that owe their time to one step; of those as good, the shortest is taken.
     """
     at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
     unsteady = ~(at_steps.max(axis=1) <= STEADY * at_steps.min(axis=1))
@@ -162,7 +165,11 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)
     ]
-    return int(left[int(np.lexsort(([merit_of(times, share) for times in both], unsteady[left]))[0])])
+    merits = np.array([merit_of(times, share) for times in both])
+    best = np.lexsort((merits, unsteady[left]))[0]
+    as_good = (merits <= AS_GOOD * merits[best]) & (unsteady[left] == unsteady[left][best])
+    lengths = np.array([len(programs[k]) for k in left])
+    return int(left[int(np.lexsort((merits, lengths, ~as_good))[0])])
 
 
 _CHOICE, REPORT = 1_000_003, 1_000_033

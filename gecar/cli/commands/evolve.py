@@ -65,7 +65,7 @@ def evolve(
                 "16; paper: 1", "K"),
     ] = None,
     share: Annotated[
-        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.97")
+        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.96")
     ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
