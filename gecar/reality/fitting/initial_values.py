@@ -127,7 +127,7 @@ def _shaft_cycles(
     Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
     either shaft do, and least squares gives both phases at once.
     """
-    bare = errors({})
+    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
     w, least = np.sqrt(weights(bare)), cost(bare)
     for cycles, size, basis in _ripples(robot, recordings, errors):
         a, b, c, d = -np.linalg.lstsq(w[:, None] * basis, w * bare, rcond=None)[0]
@@ -147,7 +147,7 @@ def _ripples(
     """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
     turned = max(_turned(r, robot) for r in recordings)
     size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
-    bare = errors({})
+    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
     for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
         if cycles * turned >= LEAST_CYCLES:
             pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
