@@ -32,9 +32,10 @@ from gecar.search.fitness import score_type
 from gecar.search.programs import RobotPrograms
 from gecar.search.settings import Settings
 from gecar.world.course.course import load_course
+from gecar.world.kernel.conditions import conditions
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.robot import load_robot
-from gecar.world.rollout import Outcome, World, simulate
+from gecar.world.rollout import Driver, Fleet, Outcome, World, simulate
 
 WORLD = World(load_robot("ev3"), load_course("paper"))
 STEADY = parse_program("if(SensorValue > 75):\n    motor(50,60,10)\nelse:\n    motor(30,-60,10)").opcodes
@@ -136,6 +137,22 @@ def test_a_program_that_owes_its_time_to_one_step_is_not_chosen():
     assert fragile[0] < steady[0] == pytest.approx(steady.max(), rel=0.02)
     assert not fragile.max() <= 1.02 * fragile[0]
     assert chosen(WORLD, [FRAGILE, STEADY], 0.0, 1) == 1
+
+
+def test_statements_that_are_only_overwritten_act_where_statements_take_time():
+    world = World(WORLD.robot, WORLD.course)
+    backwards = "motor(-70,-70,0)\n" * 4
+    hidden = parse_program(
+        backwards + "if(SensorValue > 75):\n    motor(50,60,10)\nelse:\n    motor(30,-60,10)"
+    )
+    assert simulate(world, hidden.opcodes).time_s == simulate(world, STEADY).time_s
+    late = conditions(world.robot.physics, world.step_s, world.start, world.time_limit_s, statement_ms=0.9)
+    for under, arrives_too in ((world.nominal, True), (late, False)):
+        summary, _ = Fleet(world).drive([hidden.opcodes], under, [[0, 0]], [0])
+        alone = Driver(world, under).simulate(hidden.opcodes)
+        assert (summary["outcome"][0] == Outcome.GOAL) == arrives_too
+        assert (summary["outcome"][0], summary["steps"][0]) == (alone.outcome, alone.steps)
+    assert Driver(world, late).simulate(STEADY).outcome == Outcome.GOAL
 
 
 def test_merit_orders_by_time_only_what_arrives_often_enough():

@@ -101,12 +101,14 @@ class Interpreter:
         Returns
         -------
         tuple[int, int] | None
-            None if there is no statement. Where two passes take no time, the program goes on a millisecond later.
+            None if there is no statement. Where a whole pass takes no time, the program goes on a millisecond later.
         """
-        for _ in range(2 * len(self._rows)):
+        passes = 0
+        while self._rows and passes < 2:
             if tick < self._until and not (self._ends and _holds(self._ends, read())):
                 return self._duties
             self._run_row(tick, read)
+            passes += self._at >= len(self._rows)
         return self._duties if self._rows else None
 
     def _run_row(self, tick: int, read: Callable[[], int]) -> None:

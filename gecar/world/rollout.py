@@ -200,6 +200,7 @@ class Driver:
         self.obstacles: list[Any] = []
         eyes = np.zeros(1, EYES)
         eyes["noise_pct"], eyes["motor_noise"] = under.sensor_noise_pct, under.motor_noise
+        eyes["statement_ms"] = under.statement_ms
         self.setup = Setup(
             under.physics,
             under.derived,

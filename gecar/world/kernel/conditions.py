@@ -29,6 +29,8 @@ class Conditions(NamedTuple):
         Steps until the time is out.
     sensor_noise_pct, motor_noise
         Standard deviations of a reading [%], and of a command as a share of it.
+    statement_ms
+        How long the brick takes for a motor statement, beside the time the statement asks for [ms].
     """
 
     physics: npt.NDArray[Any]
@@ -39,6 +41,7 @@ class Conditions(NamedTuple):
     limit: npt.NDArray[np.int64]
     sensor_noise_pct: npt.NDArray[np.float64]
     motor_noise: npt.NDArray[np.float64]
+    statement_ms: npt.NDArray[np.float64]
 
     def __len__(self) -> int:
         """How many drives."""
@@ -53,6 +56,7 @@ def conditions(
     phase_ms: npt.ArrayLike = 0.0,
     sensor_noise_pct: npt.ArrayLike = 0.0,
     motor_noise: npt.ArrayLike = 0.0,
+    statement_ms: npt.ArrayLike = 0.0,
 ) -> Conditions:
     """Put conditions together; numbers count for all rows.
 
@@ -60,7 +64,7 @@ def conditions(
     ----------
     physics
         Dtype `PHYSICS`, shape (n,).
-    step_s, start, phase_ms, sensor_noise_pct, motor_noise
+    step_s, start, phase_ms, sensor_noise_pct, motor_noise, statement_ms
         As in `Conditions`; a number, or one for each row; ``start`` shape (3,) or (n, 3).
     time_limit_s
         When a drive ends without GOAL [s].
@@ -82,6 +86,7 @@ def conditions(
         np.rint(time_limit_s / steps).astype(np.int64),
         each(sensor_noise_pct),
         each(motor_noise),
+        each(statement_ms),
     )
 
 

@@ -49,13 +49,14 @@ class Floor(NamedTuple):
 
 
 # Memory of the colour sensors: lagged reflections [%] of the last steps, for centre, left and right sensor; which of
-# them the program reads; standard deviation of a reading [%]; the random stream.
+# them the program reads; deviations of a reading [%] and a command; time of a statement [ms]; the random stream.
 EYES = np.dtype(
     [
         ("rings", np.float64, (3 * RING,)),
         ("used", np.int8, (3,)),
         ("noise_pct", np.float64),
         ("motor_noise", np.float64),
+        ("statement_ms", np.float64),
         ("stream", np.uint64),
     ]
 )
@@ -209,8 +210,9 @@ def _command(program: npt.NDArray[np.int32], k: Any, eyes: Any) -> bool:
     if eyes.motor_noise > 0.0:
         k.left_duty *= 1.0 + eyes.motor_noise * normal(eyes)
         k.right_duty *= 1.0 + eyes.motor_noise * normal(eyes)
-    k.due_ms += program[row, 3]
-    takes_time = program[row, 3] > 0
+    time = program[row, 3] + eyes.statement_ms
+    k.due_ms += time
+    takes_time = time > 0.0
     if until and takes_time:
         k.until = row + 1
     return takes_time

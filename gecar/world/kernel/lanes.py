@@ -236,6 +236,7 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
         e.used[sensor] = jobs.used[jobs.program[waiting], sensor]
     e.noise_pct = under.sensor_noise_pct[condition]
     e.motor_noise = under.motor_noise[condition]
+    e.statement_ms = under.statement_ms[condition]
     e.stream = jobs.stream[waiting]
     _look_from(lane, floor, m)
     return waiting + 1
