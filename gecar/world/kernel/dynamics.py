@@ -32,7 +32,7 @@ from gecar.world.kernel.series import small_cosine, small_sine
 STILL = 1e-15  # m/s and rad/s
 
 _EFFECT_FIELDS = (
-    "tilt_x", "tilt_y", "regulated", "start_latency", "actuation_delay", "dead_band", "direction_gain",
+    "tilt_x", "tilt_y", "regulated", "start_latency", "dead_band", "direction_gain",
     "full_duty_gain", "ripple_amplitude", "static_friction", "friction_ratio", "rolling_resistance", "patch_radius",
     "caster_friction", "battery_drain", "battery_resistance", "backlash",
 )  # fmt: skip

@@ -117,7 +117,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
     """
 
     def drive_lanes(  # noqa: C901, PLR0912, PLR0915
-        jobs: Jobs, under: Conditions, floor: Floor, m: Memory, ends: Ends
+        jobs: Jobs, under: Conditions, floor: Floor, late: bool, remembers: bool, m: Memory, ends: Ends
     ) -> None:
         flat = m.flat
         waiting = 0
@@ -125,7 +125,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
             waiting = _take(lane, waiting, jobs, under, floor, m)
         due = True
         while True:
-            if effects:
+            if remembers:
                 for lane in range(LANES):
                     if m.job[lane] >= 0:
                         _look_from(lane, floor, m)
@@ -138,7 +138,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
                     going = going or m.job[lane] >= 0
                 if not going:
                     return
-            if effects:
+            if late:
                 _act_late(m)
             unsettled = 0
             for lane in range(LANES):
@@ -146,8 +146,8 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
                 p = _load_physics(flat, lane)
                 c = _load_derived(flat, lane)
                 k = _load_carried(flat, lane)
-                left = k.left_acts if effects else 0.5 * k.left_command + 0.5 * k.left_before
-                right = k.right_acts if effects else 0.5 * k.right_command + 0.5 * k.right_before
+                left = k.left_acts if late else 0.5 * k.left_command + 0.5 * k.left_before
+                right = k.right_acts if late else 0.5 * k.right_command + 0.5 * k.right_before
                 settled = begin_step(s, left, right, p, c, effects)
                 k.left_before, k.right_before = k.left_command, k.right_command
                 k.settled = 1.0 if settled else 0.0
@@ -202,12 +202,11 @@ def drive_lanes(jobs: Jobs, under: Conditions, floor: Floor, memory: Memory, end
     ends
         Filled; ``arrival_s`` where a tile was reached.
     """
-    plain = (
-        under.plain.all()
-        and not under.physics["sensor_lag"].any()
-        and not under.physics["sensor_delay"].any()
-    )
-    (_drive_plain if plain else _drive_any)(jobs, under, floor, memory, ends)
+    physics = under.physics
+    late = bool(physics["actuation_delay"].any())
+    remembers = bool(physics["sensor_lag"].any() or physics["sensor_delay"].any())
+    drive = _drive_plain if under.plain.all() else _drive_any
+    drive(jobs, under, floor, late, remembers, memory, ends)
 
 
 @kernel
