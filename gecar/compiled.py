@@ -114,53 +114,55 @@ step of the simulation takes a seventh less time so.
 """
 
 
-def lane_access(dtype: np.dtype[Any], lanes: int, first: int) -> tuple[Any, Any]:
+def lane_access(dtype: np.dtype[Any], first: int) -> tuple[Any, Any]:
     """Return what copies a record out of and into one lane of a flat array, for kernels.
 
-    Field f of lane k stands at ``first + f * lanes + k``. As the records live on the stack, and all distances are known
-    to the compiler, a loop over lanes that loads, calls kernels on the records and stores can become vector code.
+    Field f of lane k stands at ``(first + f) * lanes + k``. As the records live on the stack, and all distances are
+    known where ``lanes`` is a constant, a loop over lanes that loads, calls kernels on the records and stores can
+    become vector code.
 
     Parameters
     ----------
     dtype
         The record's; all its fields are float64.
-    lanes
-        How many lanes there are.
     first
-        Where the record's first field begins.
+        How many fields of other records stand before it.
 
     Returns
     -------
     tuple
-        ``load(flat, lane)`` returns the record; ``store(flat, lane, record)`` copies it back.
+        ``load(flat, lanes, lane)`` returns the record; ``store(flat, lanes, lane, record)`` copies it back.
     """
     record = numba.from_dtype(dtype)
-    offsets = [(first + k * lanes, 8 * k) for k in range(len(dtype.names or ()))]
+    fields = [(first + k, 8 * k) for k in range(len(dtype.names or ()))]
 
-    def places(context: Any, builder: Any, array_type: Any, array: Any, lane: Any, slot: Any) -> Any:
+    def places(context: Any, builder: Any, array_type: Any, arguments: Any, slot: Any) -> Any:
+        array, lanes, lane = arguments
         data = context.make_array(array_type)(context, builder, array).data
         bytes_of = builder.bitcast(slot, ir.IntType(8).as_pointer())
-        for in_flat, in_record in offsets:
-            at = builder.add(lane, context.get_constant(types.intp, in_flat))
+        for in_flat, in_record in fields:
+            row = builder.mul(lanes, context.get_constant(types.intp, in_flat))
             field = builder.gep(bytes_of, [context.get_constant(types.intp, in_record)])
-            yield builder.gep(data, [at]), builder.bitcast(field, ir.DoubleType().as_pointer())
+            yield (
+                builder.gep(data, [builder.add(lane, row)]),
+                builder.bitcast(field, ir.DoubleType().as_pointer()),
+            )
 
-    def load(typing_context: Any, flat_type: Any, lane_type: Any) -> Any:  # noqa: ARG001
+    def load(typing_context: Any, flat: Any, lanes: Any, lane: Any) -> Any:  # noqa: ARG001
         def copy(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             slot = cgutils.alloca_once(builder, context.get_value_type(record).pointee)  # type: ignore[no-untyped-call]
-            flat, lane = arguments
-            for source, target in places(context, builder, signature.args[0], flat, lane, slot):
+            for source, target in places(context, builder, signature.args[0], arguments, slot):
                 builder.store(builder.load(source), target)
             return slot
 
-        return record(flat_type, types.intp), copy
+        return record(flat, types.intp, types.intp), copy
 
-    def store(typing_context: Any, flat: Any, lane: Any, given: Any) -> Any:  # noqa: ARG001
+    def store(typing_context: Any, flat: Any, lanes: Any, lane: Any, given: Any) -> Any:  # noqa: ARG001
         def copy(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            for target, source in places(context, builder, signature.args[0], *arguments):
+            for target, source in places(context, builder, signature.args[0], arguments[:3], arguments[3]):
                 builder.store(builder.load(source), target)
             return context.get_dummy_value()
 
-        return types.void(flat, types.intp, given), copy
+        return types.void(flat, types.intp, types.intp, given), copy
 
     return intrinsic(load), intrinsic(store)

@@ -1,13 +1,8 @@
 """Many drives in lock step: `LANES` robots at once, so that the compiler's vector instructions serve all of them.
 
 Every lane holds one drive: a program under its own conditions (robot, start, step, noise). All lanes go through a step
-together, by the same functions that `gecar.world.kernel.drive` calls for one robot: physics stands once. A lane whose
-drive has ended takes the next one. What happens seldom, a program's statement or a new tile, is done lane by lane.
-
-The numbers of all lanes lie in one flat array, field after field, indexed ``field * LANES + lane``. A loop over the
-lanes copies its lane's fields into records on the stack, calls the scalar kernels on them, and copies back; LLVM turns
-the branches of the kernels into selects, and the loop into vector code. In one array all distances between fields are
-known when it is compiled, so that nothing has to be checked at run time.
+together (`gecar.world.lock_step`); one whose drive has ended takes the next. What happens seldom, a program's statement
+or a new tile, is done lane by lane.
 """
 
 from __future__ import annotations
@@ -18,39 +13,37 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import kernel, lane_access
-from gecar.world.effects import PHYSICS
 from gecar.world.kernel.conditions import Conditions
-from gecar.world.kernel.contacts import sweep
 from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, arrive, begin_program, tile_at
-from gecar.world.kernel.dynamics import begin_step, drift, end_step
 from gecar.world.kernel.interpreter import CONTROL, EYES, Floor, look, run_program
 from gecar.world.kernel.sensing import RING, delayed
-from gecar.world.kernel.state import DERIVED, STATE, place
+from gecar.world.kernel.state import place
+from gecar.world.lock_step import (
+    LANES,
+    N_FIELDS,
+    advance_lanes,
+    lane_memory,
+    load_acting,
+    load_derived,
+    load_physics,
+    load_state,
+    store_acting,
+    store_derived,
+    store_physics,
+    store_state,
+)
 
-LANES = 8
-"""Two vectors of AVX2, one of AVX-512."""
-
-# What a lane carries beside its robot: the commands of this step and the one before, after the cap, and as they act
-# now; whether the contacts are settled; the tile; the step, the one the program or the time limit waits for,
-# and whether something has to be done now: then, or on another tile.
+# What a lane carries beside its robot: the commands of this step and the one before, after the cap; the tile; the step,
+# the one the program or the time limit waits for, and whether something has to be done now: then, or on another tile.
 _CARRIED = (
-    "left_command", "right_command", "left_before", "right_before", "left_acts", "right_acts",
-    "settled", "column", "row", "step", "wake", "due",
+    "left_command", "right_command", "left_before", "right_before", "column", "row", "step", "wake", "due",
 )  # fmt: skip
 CARRIED = np.dtype([(field, np.float64) for field in _CARRIED])
-_P = len(STATE.names or ()) * LANES
-_C = _P + len(PHYSICS.names or ()) * LANES
-_K = _C + len(DERIVED.names or ()) * LANES
 _DUE, _LEFT, _RIGHT, _COLUMN, _ROW, _WAKE = (
-    _K + _CARRIED.index(field) * LANES
+    (N_FIELDS + _CARRIED.index(field)) * LANES
     for field in ("due", "left_command", "right_command", "column", "row", "wake")
 )
-N_FLAT = _K + len(_CARRIED) * LANES
-
-_load_state, _store_state = lane_access(STATE, LANES, 0)
-_load_physics, _store_physics = lane_access(PHYSICS, LANES, _P)
-_load_derived, _store_derived = lane_access(DERIVED, LANES, _C)
-_load_carried, _store_carried = lane_access(CARRIED, LANES, _K)
+_load_carried, _store_carried = lane_access(CARRIED, N_FIELDS)
 
 
 class Jobs(NamedTuple):
@@ -101,7 +94,7 @@ class Memory(NamedTuple):
 def make_memory() -> Memory:
     """Return the working memory `drive_lanes` needs."""
     return Memory(
-        np.zeros(N_FLAT),
+        lane_memory(N_FIELDS + len(_CARRIED), LANES),
         np.zeros(LANES, CONTROL),
         np.zeros(LANES, EYES),
         np.zeros(LANES * 2 * RING),
@@ -110,13 +103,13 @@ def make_memory() -> Memory:
     )
 
 
-def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
+def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901
     """Return the compiled `drive_lanes` for robots with effects, or for plain ones; compiled when first called.
 
     All loops over the lanes stand in this one function, with ``effects`` a constant: LLVM makes them vector code.
     """
 
-    def drive_lanes(  # noqa: C901, PLR0912, PLR0915
+    def drive_lanes(  # noqa: C901, PLR0912
         jobs: Jobs, under: Conditions, floor: Floor, late: bool, remembers: bool, m: Memory, ends: Ends
     ) -> None:
         flat = m.flat
@@ -140,44 +133,28 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901, PLR0915
                     return
             if late:
                 _act_late(m)
-            unsettled = 0
-            for lane in range(LANES):
-                s = _load_state(flat, lane)
-                p = _load_physics(flat, lane)
-                c = _load_derived(flat, lane)
-                k = _load_carried(flat, lane)
-                left = k.left_acts if late else 0.5 * k.left_command + 0.5 * k.left_before
-                right = k.right_acts if late else 0.5 * k.right_command + 0.5 * k.right_before
-                settled = begin_step(s, left, right, p, c, effects)
-                k.left_before, k.right_before = k.left_command, k.right_command
-                k.settled = 1.0 if settled else 0.0
-                unsettled += 0 if settled else 1
-                _store_state(flat, lane, s)
-                _store_carried(flat, lane, k)
-            if unsettled > 0:
+            else:
                 for lane in range(LANES):
-                    s = _load_state(flat, lane)
-                    c = _load_derived(flat, lane)
-                    k = _load_carried(flat, lane)
-                    if k.settled == 0.0 and not sweep(s, c, effects):
-                        sweep(s, c, effects)
-                    _store_state(flat, lane, s)
+                    k = _load_carried(flat, LANES, lane)
+                    a = load_acting(flat, LANES, lane)
+                    a.left = 0.5 * k.left_command + 0.5 * k.left_before
+                    a.right = 0.5 * k.right_command + 0.5 * k.right_before
+                    k.left_before, k.right_before = k.left_command, k.right_command
+                    store_acting(flat, LANES, lane, a)
+                    _store_carried(flat, LANES, lane, k)
+            advance_lanes(flat, LANES, effects)
             asking = 0
             for lane in range(LANES):
-                s = _load_state(flat, lane)
-                p = _load_physics(flat, lane)
-                c = _load_derived(flat, lane)
-                k = _load_carried(flat, lane)
-                end_step(s, p, c, effects)
-                drift(s, c)
+                s = load_state(flat, LANES, lane)
+                p = load_physics(flat, LANES, lane)
+                k = _load_carried(flat, LANES, lane)
                 k.step += 1.0
                 column = np.floor((s.x - p.com_ahead * s.cos) * floor.per_tile)
                 row = np.floor((s.y - p.com_ahead * s.sin) * floor.per_tile)
                 asks = k.step >= k.wake or column != k.column or row != k.row
                 k.due = 1.0 if asks else 0.0
                 asking += 1 if asks else 0
-                _store_state(flat, lane, s)
-                _store_carried(flat, lane, k)
+                _store_carried(flat, LANES, lane, k)
             due = asking > 0
 
     return kernel(drive_lanes)
@@ -219,15 +196,15 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
     m.passed[lane] = 0
     condition = jobs.condition[waiting]
     p = under.physics[condition]
-    _store_physics(m.flat, lane, p)
-    _store_derived(m.flat, lane, under.derived[condition])
-    s = _load_state(m.flat, lane)
+    store_physics(m.flat, LANES, lane, p)
+    store_derived(m.flat, LANES, lane, under.derived[condition])
+    s = load_state(m.flat, LANES, lane)
     place(s, p, under.start[condition, 0], under.start[condition, 1], under.start[condition, 2])
-    _store_state(m.flat, lane, s)
-    k = _load_carried(m.flat, lane)
+    store_state(m.flat, LANES, lane, s)
+    k = _load_carried(m.flat, LANES, lane)
     k.left_command = k.right_command = k.left_before = k.right_before = k.step = 0.0
     k.due = 1.0
-    _store_carried(m.flat, lane, k)
+    _store_carried(m.flat, LANES, lane, k)
     m.commands[2 * RING * lane : 2 * RING * (lane + 1)] = 0.0
     begin_program(m.control[lane], under.phase_ms[condition], under.derived[condition].dt, s, p, floor)
     e = m.eyes[lane]
@@ -244,11 +221,11 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
 @kernel
 def _look_from(lane: int, floor: Floor, m: Memory) -> None:
     """Feed the sensors' memories of a lane, where they lag or are late."""
-    p = _load_physics(m.flat, lane)
+    p = load_physics(m.flat, LANES, lane)
     if p.sensor_lag > 0.0 or p.sensor_delay > 0.0:
-        s = _load_state(m.flat, lane)
-        k = _load_carried(m.flat, lane)
-        c = _load_derived(m.flat, lane)
+        s = load_state(m.flat, LANES, lane)
+        k = _load_carried(m.flat, LANES, lane)
+        c = load_derived(m.flat, LANES, lane)
         look(int(k.step), s, p, c.dt, floor, m.eyes[lane])
 
 
@@ -256,10 +233,10 @@ def _look_from(lane: int, floor: Floor, m: Memory) -> None:
 def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, ends: Ends) -> bool:
     """Do what is due in a lane: a tile entered, a statement; return whether its drive goes on."""
     job = m.job[lane]
-    s = _load_state(m.flat, lane)
-    p = _load_physics(m.flat, lane)
-    c = _load_derived(m.flat, lane)
-    k = _load_carried(m.flat, lane)
+    s = load_state(m.flat, LANES, lane)
+    p = load_physics(m.flat, LANES, lane)
+    c = load_derived(m.flat, LANES, lane)
+    k = _load_carried(m.flat, LANES, lane)
     control = m.control[lane]
     n = int(k.step)
     control.step = n
@@ -300,11 +277,11 @@ def _change(flat: npt.NDArray[np.float64], at: int, value: float) -> None:
 def _act_late(m: Memory) -> None:
     """Set the commands that act in this step, lane by lane: each with a delay of its own."""
     for lane in range(LANES):
-        k = _load_carried(m.flat, lane)
-        c = _load_derived(m.flat, lane)
+        k, a = _load_carried(m.flat, LANES, lane), load_acting(m.flat, LANES, lane)
+        c = load_derived(m.flat, LANES, lane)
         n, ring = int(k.step), 2 * RING * lane
         m.commands[ring + (n & (RING - 1))] = k.left_command
         m.commands[ring + RING + (n & (RING - 1))] = k.right_command
-        k.left_acts = delayed(m.commands, ring, n, c.late)
-        k.right_acts = delayed(m.commands, ring + RING, n, c.late)
-        _store_carried(m.flat, lane, k)
+        a.left = delayed(m.commands, ring, n, c.late)
+        a.right = delayed(m.commands, ring + RING, n, c.late)
+        store_acting(m.flat, LANES, lane, a)
