@@ -1,8 +1,9 @@
-"""Replays of a recording of 12 s, commands through the simulated robot, on one core."""
+"""Replays of a recording of 12 s, commands through the simulated robot, on one core: one by one, and in lock step."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course.course import load_course
+from gecar.world.lock_step import LANES
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 
@@ -20,9 +22,17 @@ PROGRAM = "motor(60,40,200)\nmotor(-50,50,180)\nmotor(30,80,150)\nmotor(-40,-70,
 def rows() -> list[tuple[str, str, str]]:
     """Return this benchmark's rows: figure, value, goal."""
     recording = recorded()
+    slippery = {"slippery_patch": {"radius_m": 0.3, "x_m": 0.3, "y_m": 0.9, "coefficient": 0.1}}
+    kinds: dict[str, dict[str, dict[str, float]]] = {
+        "plain robots": {}, "with a dead band": {"dead_band": {"duty_pct": 3.0}}, "with a slippery patch": slippery,
+    }  # fmt: skip
     return [
         ("12 s replayed whole", f"{replay_ms(recording, np.inf):.2f} ms", "<= 1.5 ms"),
         ("12 s replayed, re-based over 1 s", f"{replay_ms(recording, 1.0):.2f} ms", "<= 1.5 ms"),
+        *(
+            (f"{LANES} robots one by one : in lock step, {name}", f"{gain(recording, effects):.1f}", ">= 1.5")
+            for name, effects in kinds.items()
+        ),
     ]
 
 
@@ -56,6 +66,24 @@ def replay_ms(recording: Recording, memory_s: float, repeats: int = 200) -> floa
         replayer.play(physics)
         best = min(best, time.perf_counter() - start)
     return 1e3 * best
+
+
+def gain(recording: Recording, effects: Mapping[str, Mapping[str, float]], repeats: int = 100) -> float:
+    """Return how many times longer robots take one by one than in lock step: shortest times, taken in turn."""
+    replayer, physics = (
+        replayer_of(recording, memory_s=1.0),
+        np.repeat(load_robot("ev3").with_effects(effects).physics, LANES),
+    )
+    physics["mass"] *= np.linspace(0.9, 1.1, LANES)
+    singles = [physics[k : k + 1] for k in range(LANES)]
+    shortest = [float("inf"), float("inf")]
+    for _ in range(repeats):
+        for which, batches in enumerate((singles, [physics])):
+            start = time.perf_counter()
+            for batch in batches:
+                replayer.errors(batch)
+            shortest[which] = min(shortest[which], time.perf_counter() - start)
+    return shortest[0] / shortest[1]
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from acting import strong
 
 from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
@@ -16,14 +17,6 @@ from gecar.world.rollout import Driver, Fleet, Outcome, World
 
 EV3, PAPER = load_robot("ev3"), load_course("paper")
 WORLD = World(EV3, PAPER, time_limit_s=12.0)
-# Shaped so that each effect acts, at half of its bounds or where a robot would have it.
-STRONG = {
-    "command_slew": {"rate_pct_s": 300.0},
-    "speed_limit": {"speed_rad_s": 9.0},
-    "static_friction": {"extra_torque_nm": 0.03, "speed_rad_s": 1.0},
-    "slippery_patch": {"radius_m": 0.4, "x_m": 0.3, "y_m": 0.9, "coefficient": 0.1},
-    "com_offset": {"ahead_m": -0.05},
-}
 
 
 def random_programs(n: int, seed: int = 1) -> list[np.ndarray]:
@@ -32,13 +25,6 @@ def random_programs(n: int, seed: int = 1) -> list[np.ndarray]:
     )
     programs = [mapped.program(i) for i in range(len(mapped)) if mapped.valid[i]]
     return [program.opcodes for program in programs[:n]]
-
-
-def strong(effect):
-    first = effect.parameters[0]
-    neutral = EV3.nominal(first)
-    high = first.high if np.isfinite(first.high) else first.low + 1.0
-    return STRONG.get(effect.id, {first.label: 0.5 * (neutral + (high if high != neutral else first.low))})
 
 
 def assert_same(world, programs, under, pairs, streams):

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from acting import strong
 
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.replayer import replay, replayer_of
+from gecar.world.effects import CATALOGUE
+from gecar.world.lock_step import LANES
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")
@@ -93,3 +97,43 @@ def test_twelve_seconds_replay_within_a_few_milliseconds() -> None:
     for _ in range(10):
         replayer.play(physics)
     assert (time.process_time() - began) / 10 < 0.006  # 0.0007 on an idle core; this machine may be busy
+
+
+def every_robot() -> np.ndarray:
+    """Physics of the EV3, regulated, and with each effect of the catalogue; again with more mass; shape (n,)."""
+    drive = EV3.drive.model_copy(update={"mode": "speed"})
+    robots = [EV3, EV3.model_copy(update={"drive": drive})]
+    robots += [EV3.with_effects({effect.id: strong(effect)}) for effect in CATALOGUE]
+    physics = np.concatenate([robot.physics for robot in robots])
+    heavier = physics.copy()
+    heavier["mass"] *= 1.05
+    return np.concatenate([physics, heavier])
+
+
+@pytest.mark.parametrize("memory_s", [1.0, np.inf])
+@pytest.mark.parametrize("rig", ["floor", "bench"])
+def test_robots_in_lock_step_are_replayed_as_each_alone(memory_s: float, rig: str) -> None:
+    physics = every_robot()
+    whole, row = driven(waves, steps, seconds=2.0, rig=rig), np.arange(200)
+    gaps = replace(
+        whole,
+        x_m=np.where(row % 7 == 5, np.nan, whole.x_m),
+        heading_rad=np.where(row % 5 == 3, np.nan, whole.heading_rad),
+        left_angle_rad=np.where(row % 2 == 0, np.nan, whole.left_angle_rad),
+    )
+    for recording in (driven(steps, waves, seconds=2.0, rig=rig), gaps):
+        replayer = replayer_of(recording, memory_s=memory_s)
+        together = replayer.errors(physics)
+        for k in range(len(physics)):
+            alone = replayer.play(physics[k : k + 1])
+            apart = np.concatenate([alone.row_errors.T.ravel(), alone.pose_errors.T.ravel()])
+            np.testing.assert_array_equal(together[k], apart)
+
+
+def test_robots_told_at_other_times_are_replayed_apart() -> None:
+    physics = np.repeat(EV3.physics, 2 * LANES)
+    physics["actuation_delay"][::2] = 0.02
+    physics["clock_skew"][3] = 0.01
+    errors = np.nan_to_num(replayer_of(driven(steps, waves), memory_s=1.0).errors(physics))
+    assert (errors[::2] == errors[0]).all()
+    assert len(np.unique(errors, axis=0)) == 3

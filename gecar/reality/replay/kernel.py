@@ -6,65 +6,74 @@ adds them up, wheel angles and pose, drifts for ever once it is wrong, so it is 
 wheel angles with a fixed memory, the pose by a Kalman filter on (x, y, heading), whose normalised innovations are
 the whitened residual. With an endless memory the replay is open loop from start to end.
 
-Sources: prediction-error identification, Ljung, System Identification (2nd ed.), ch. 7; extended Kalman filter with
-sequential scalar updates, Bar-Shalom, Li, Kirubarajan, Estimation with Applications (2001), ch. 5 and 10.
+Robots that are told and seen at the same times are replayed in lock step (`gecar.world.lock_step`).
+
+Source: prediction-error identification, Ljung, System Identification (2nd ed.), ch. 7.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import compiled
-from gecar.world.kernel.dynamics import drift, step
+from gecar.compiled import kernel, lane_access
+from gecar.reality.replay.kernel_data import Kept, KernelInput
+from gecar.reality.replay.pose_filter import (
+    FILTER,
+    POSE,
+    begin_filter,
+    correct,
+    grow,
+    predict_pose,
+    rebase,
+)
+from gecar.world.kernel.dynamics import is_plain
 from gecar.world.kernel.motor import bench_step, supply
 from gecar.world.kernel.state import derive, place
+from gecar.world.lock_step import (
+    LANES,
+    N_FIELDS,
+    advance_lanes,
+    lane_memory,
+    load_acting,
+    load_derived,
+    load_physics,
+    load_state,
+    store_acting,
+    store_derived,
+    store_physics,
+    store_state,
+)
 
 Array = npt.NDArray[np.float64]
 
 # Columns of what a replay predicts at each row; angles, voltage and rate before the row's own measurement corrects it.
 LEFT_ANGLE, RIGHT_ANGLE, BATTERY, YAW_RATE, X, Y, HEADING, LEFT_SPEED, RIGHT_SPEED, AHEAD, ASIDE = range(11)
 ROW_COLUMNS = 11
+MOST_STEPS = 100_000_000
+
+TIMING = ("clock_skew", "actuation_delay", "pose_delay", "duty_cap")
+"""What robots must share to be replayed in lock step, fields of the `PHYSICS` record."""
+
+_ROW = (
+    "left_error right_error battery_error yaw_error "
+    "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside"
+)
+ROW = np.dtype([(field, np.float64) for field in _ROW.split()])
+"""Normalised residuals at a row, and what is predicted there, in the order of the columns above."""
+
+_OF_ROW = N_FIELDS + len(FILTER.descr)
+_OF_POSE = _OF_ROW + len(ROW.descr)
+N_REPLAY_FIELDS = _OF_POSE + len(POSE.descr)
+_load_filter, _store_filter = lane_access(FILTER, N_FIELDS)
+_load_row, _store_row = lane_access(ROW, _OF_ROW)
+_load_pose, _store_pose = lane_access(POSE, _OF_POSE)
 
 
-class KernelInput(NamedTuple):
-    """A recording as the kernel reads it.
-
-    Attributes
-    ----------
-    t
-        Time of each row from the start of the simulation [s], shape (rows,).
-    commands
-        Duty of both motors, before the cap, shape (rows, 2).
-    measured
-        Left angle, right angle [rad], battery [V], yaw rate [rad/s]; nan where absent, shape (rows, 4).
-    pose_t, pose
-        Time of each pose [s], shape (poses,), and x, y [m], heading [rad], nan where absent, shape (poses, 3).
-    sd
-        Noise: one encoder's [rad], battery [V], yaw rate [rad/s], x and y [m], heading [rad], shape (5,).
-    walk
-        Process noise of the pose, a random walk: position [m/sqrt(s)], heading [rad/sqrt(s)], shape (2,).
-    memory
-        Over which wheel angles are re-based [s]; inf: never, and neither is the pose.
-    bench
-        Whether the wheels hang in the air.
-    """
-
-    t: Array
-    commands: Array
-    measured: Array
-    pose_t: Array
-    pose: Array
-    sd: Array
-    walk: Array
-    memory: float
-    bench: bool
-
-
-@compiled
+@kernel
 def _held(commands: Array, t: Array, motor: int, at: int, start: float, end: float, cap: float) -> float:
     """Return a motor's mean command between two times; ``at`` is the last row before ``start``, -1 for none."""
     if at >= 0 and (at + 1 == t.shape[0] or t[at + 1] >= end):  # one row holds throughout: nearly always
@@ -81,204 +90,217 @@ def _held(commands: Array, t: Array, motor: int, at: int, start: float, end: flo
     return total
 
 
-@compiled
-def _compare_rows(
-    i: int,
-    now: float,
-    stretch: float,
-    inputs: KernelInput,
-    s: Any,
-    p: Any,
-    rows: Array,
-    errors: Array,
-    last: Array,
-) -> int:
-    """Predict, compare and re-base at every row up to now; return the next row."""
+@kernel
+def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
+    """Predict what was measured some time ago."""
+    r.left_angle = s.left_angle - s.left_speed * back
+    r.right_angle = s.right_angle - s.right_speed * back
+    r.battery = supply(s, p)
+    r.yaw_rate = s.yaw_rate
+    r.x = s.x - p.com_ahead * s.cos - (s.vx + s.yaw_rate * p.com_ahead * s.sin) * back
+    r.y = s.y - p.com_ahead * s.sin - (s.vy - s.yaw_rate * p.com_ahead * s.cos) * back
+    r.heading = s.heading - s.yaw_rate * back
+    r.left_speed = s.left_speed
+    r.right_speed = s.right_speed
+    r.ahead = s.vx * s.cos + s.vy * s.sin
+    r.aside = s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
+
+
+@kernel
+def _compare_row(i: int, back: float, inputs: KernelInput, weights: Array, flat: Array, lanes: int) -> None:
+    """Predict and compare at a row, and draw the wheel angles towards it; ``weights`` as in `_weigh`."""
+    measured, sd = inputs.measured, inputs.sd
+    left, right, battery, yaw = measured[i, 0], measured[i, 1], measured[i, 2], measured[i, 3]
+    angle_sd, battery_sd, yaw_sd = sd[0], sd[1], sd[2]
+    left_weight, right_weight = weights[0], weights[1]
     endless = math.isinf(inputs.memory)
-    while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
-        back = now - inputs.t[i] * stretch
-        rows[i, 0] = s.left_angle - s.left_speed * back
-        rows[i, 1] = s.right_angle - s.right_speed * back
-        rows[i, 2] = supply(s, p)
-        rows[i, 3] = s.yaw_rate
-        rows[i, 4] = s.x - p.com_ahead * s.cos - (s.vx + s.yaw_rate * p.com_ahead * s.sin) * back
-        rows[i, 5] = s.y - p.com_ahead * s.sin - (s.vy - s.yaw_rate * p.com_ahead * s.cos) * back
-        rows[i, 6] = s.heading - s.yaw_rate * back
-        rows[i, 7] = s.left_speed
-        rows[i, 8] = s.right_speed
-        rows[i, 9] = s.vx * s.cos + s.vy * s.sin
-        rows[i, 10] = s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
-        for k in range(4):
-            errors[i, k] = (inputs.measured[i, k] - rows[i, k]) / inputs.sd[max(k - 1, 0)]
-        for k in range(2):
-            if not (endless or math.isnan(errors[i, k])):
-                # A young mean weighs all it has seen alike; an old one forgets.
-                keep = math.exp(-(inputs.t[i] - last[k]) / inputs.memory)
-                last[2 + k] = 1.0 + last[2 + k] * keep
-                last[k] = inputs.t[i]
-                shift = errors[i, k] * inputs.sd[0] / last[2 + k]
-                if k == 0:
-                    s.left_angle += shift
-                else:
-                    s.right_angle += shift
-        i += 1
-    return i
+    for lane in range(lanes):
+        s = load_state(flat, lanes, lane)
+        p = load_physics(flat, lanes, lane)
+        r = _load_row(flat, lanes, lane)
+        _predict_row(s, p, back, r)
+        r.left_error = (left - r.left_angle) / angle_sd
+        r.right_error = (right - r.right_angle) / angle_sd
+        r.battery_error = (battery - r.battery) / battery_sd
+        r.yaw_error = (yaw - r.yaw_rate) / yaw_sd
+        if not endless:
+            s.left_angle += 0.0 if math.isnan(r.left_error) else r.left_error * angle_sd / left_weight
+            s.right_angle += 0.0 if math.isnan(r.right_error) else r.right_error * angle_sd / right_weight
+        store_state(flat, lanes, lane, s)
+        _store_row(flat, lanes, lane, r)
 
 
-@compiled
-def _grow_covariance(before: Array, x: float, y: float, elapsed: float, walk: Array, spread: Array) -> None:
-    """Let the pose's uncertainty grow over a stretch driven since the last pose.
+@kernel
+def _weigh(i: int, inputs: KernelInput, weights: Array) -> None:
+    """Age what was seen of each wheel angle, and add a row: weights, shape (2,), and times they are of [s], (2,).
 
-    d(x, y) follows the heading's error turned a quarter: F = [[1, 0, -dy], [0, 1, dx], [0, 0, 1]];
-    P becomes F P F' + Q.
+    A young mean weighs all it has seen alike; an old one forgets.
     """
-    dx = x - before[0]
-    dy = y - before[1]
-    for k in range(3):
-        spread[0, k] -= dy * spread[2, k]
-        spread[1, k] += dx * spread[2, k]
-    for k in range(3):
-        spread[k, 0] -= dy * spread[k, 2]
-        spread[k, 1] += dx * spread[k, 2]
-    spread[0, 0] += walk[0] * walk[0] * elapsed
-    spread[1, 1] += walk[0] * walk[0] * elapsed
-    spread[2, 2] += walk[1] * walk[1] * elapsed
+    for k in range(2):
+        if not math.isnan(inputs.measured[i, k]):
+            keep = math.exp(-(inputs.t[i] - weights[2 + k]) / inputs.memory)
+            weights[k] = 1.0 + weights[k] * keep
+            weights[2 + k] = inputs.t[i]
 
 
-@compiled
-def _compare_poses(
-    j: int, now: float, stretch: float, late: float, inputs: KernelInput, s: Any, p: Any,
-    poses: Array, errors: Array, before: Array, spread: Array, shift: Array,
-) -> int:  # fmt: skip
-    """Predict, compare and re-base at every pose up to now; return the next pose."""
+@kernel
+def _compare_pose(j: int, back: float, elapsed: float, inputs: KernelInput, flat: Array, lanes: int) -> None:
+    """Predict and compare at a pose, and move the robot towards it."""
+    x, y, heading = inputs.pose[j, 0], inputs.pose[j, 1], inputs.pose[j, 2]
+    place_sd, turn_sd = inputs.sd[3], inputs.sd[4]
+    place = inputs.walk[0] * inputs.walk[0] * elapsed
+    turn = inputs.walk[1] * inputs.walk[1] * elapsed
     endless = math.isinf(inputs.memory)
-    while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
-        back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if now > 0.0 else 0.0
-        axle_x = s.x - p.com_ahead * s.cos
-        axle_y = s.y - p.com_ahead * s.sin
-        poses[j, 0] = axle_x - (s.vx + s.yaw_rate * p.com_ahead * s.sin) * back
-        poses[j, 1] = axle_y - (s.vy - s.yaw_rate * p.com_ahead * s.cos) * back
-        poses[j, 2] = s.heading - s.yaw_rate * back
+    for lane in range(lanes):
+        s = load_state(flat, lanes, lane)
+        p = load_physics(flat, lanes, lane)
+        f = _load_filter(flat, lanes, lane)
+        r = _load_pose(flat, lanes, lane)
+        predict_pose(s, p, back, r)
         if endless:
-            for k in range(3):
-                errors[j, k] = (inputs.pose[j, k] - poses[j, k]) / inputs.sd[3 if k < 2 else 4]
-            j += 1
-            continue
-        _grow_covariance(
-            before, poses[j, 0], poses[j, 1], max(inputs.pose_t[j] - before[2], 0.0), inputs.walk, spread
-        )
-        shift[:] = 0.0
-        for k in range(3):
-            variance = inputs.sd[3 if k < 2 else 4] ** 2
-            innovation = inputs.pose[j, k] - poses[j, k] - shift[k]
-            total = spread[k, k] + variance
-            errors[j, k] = innovation / math.sqrt(total)
-            if math.isnan(innovation):
-                continue
-            gain_x, gain_y, gain_h = spread[0, k] / total, spread[1, k] / total, spread[2, k] / total
-            shift[0] += gain_x * innovation
-            shift[1] += gain_y * innovation
-            shift[2] += gain_h * innovation
-            row_0, row_1, row_2 = spread[k, 0], spread[k, 1], spread[k, 2]
-            spread[0, 0] -= gain_x * row_0
-            spread[0, 1] -= gain_x * row_1
-            spread[0, 2] -= gain_x * row_2
-            spread[1, 0] -= gain_y * row_0
-            spread[1, 1] -= gain_y * row_1
-            spread[1, 2] -= gain_y * row_2
-            spread[2, 0] -= gain_h * row_0
-            spread[2, 1] -= gain_h * row_1
-            spread[2, 2] -= gain_h * row_2
-        _rebase(s, p, shift)
-        before[0] = poses[j, 0] + shift[0]
-        before[1] = poses[j, 1] + shift[1]
-        before[2] = inputs.pose_t[j]
-        j += 1
-    return j
+            r.x_error = (x - r.x) / place_sd
+            r.y_error = (y - r.y) / place_sd
+            r.heading_error = (heading - r.heading) / turn_sd
+        else:
+            grow(f, r, place, turn)
+            correct(f, r, x, y, heading, place_sd, turn_sd)
+            rebase(s, p, f)
+        store_state(flat, lanes, lane, s)
+        _store_filter(flat, lanes, lane, f)
+        _store_pose(flat, lanes, lane, r)
 
 
-@compiled
-def _rebase(s: Any, p: Any, shift: Array) -> None:
-    """Move the robot by a small pose; its velocity turns with it."""
-    x = s.x - p.com_ahead * s.cos + shift[0]
-    y = s.y - p.com_ahead * s.sin + shift[1]
-    ahead = s.vx * s.cos + s.vy * s.sin
-    aside = s.vy * s.cos - s.vx * s.sin
-    s.heading += shift[2]
-    s.cos = math.cos(s.heading)
-    s.sin = math.sin(s.heading)
-    s.x = x + p.com_ahead * s.cos
-    s.y = y + p.com_ahead * s.sin
-    s.vx = ahead * s.cos - aside * s.sin
-    s.vy = ahead * s.sin + aside * s.cos
+@kernel
+def _begin(physics: npt.NDArray[Any], start: Array, dt: float, flat: Array, lanes: int) -> None:
+    """Put every lane's robot at rest at the start."""
+    for lane in range(lanes):
+        p = physics[lane]
+        store_physics(flat, lanes, lane, p)
+        c = load_derived(flat, lanes, lane)
+        derive(p, dt, c)
+        store_derived(flat, lanes, lane, c)
+        s = load_state(flat, lanes, lane)
+        place(s, p, start[0], start[1], start[2])
+        store_state(flat, lanes, lane, s)
+        f = _load_filter(flat, lanes, lane)
+        begin_filter(f, start[0], start[1])
+        _store_filter(flat, lanes, lane, f)
 
 
-@compiled
-def replay_rows(
+@kernel
+def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int, effects: bool) -> None:
+    """Advance every lane by one step under the same commands."""
+    if bench:
+        for lane in range(lanes):
+            s = load_state(flat, lanes, lane)
+            bench_step(s, left, right, load_physics(flat, lanes, lane), load_derived(flat, lanes, lane))
+            store_state(flat, lanes, lane, s)
+        return
+    for lane in range(lanes):
+        a = load_acting(flat, lanes, lane)
+        a.left, a.right = left, right
+        store_acting(flat, lanes, lane, a)
+    advance_lanes(flat, lanes, effects)
+
+
+@kernel
+def _keep(flat: Array, first: int, predicted: Array, errors: Array, row: int) -> None:
+    """Keep what all lanes found at a row: residuals, and predictions where they are wanted."""
+    for k in range(errors.shape[1]):
+        errors[row, k] = flat[first + k]
+    if predicted.shape[0] > 0:
+        for k in range(predicted.shape[1]):
+            predicted[row, k] = flat[first + errors.shape[1] + k]
+
+
+@kernel
+def _replay(
     inputs: KernelInput,
     physics: npt.NDArray[Any],
-    derived: npt.NDArray[Any],
-    state: npt.NDArray[Any],
     start: Array,
     offset: float,
     dt: float,
-    rows: Array,
-    row_errors: Array,
-    poses: Array,
-    pose_errors: Array,
+    flat: Array,
+    weights: Array,
+    kept: Kept,
+    lanes: int,
+    effects: bool,
 ) -> None:
-    """Replay a recording.
+    _begin(physics, start, dt, flat, lanes)
+    shared = physics[0]
+    cap, delay = shared.duty_cap, shared.actuation_delay
+    stretch = 1.0 / (1.0 + shared.clock_skew)
+    late = shared.pose_delay + offset
+    weights[:] = 0.0
+    before = 0.0
+    i = j = n = 0
+    at = -1
+    while True:
+        now = n * dt
+        while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
+            _weigh(i, inputs, weights)
+            _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes)
+            _keep(flat, _OF_ROW * lanes, kept.rows, kept.row_errors, i)
+            i += 1
+        while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
+            back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if n > 0 else 0.0
+            _compare_pose(j, back, max(inputs.pose_t[j] - before, 0.0), inputs, flat, lanes)
+            _keep(flat, _OF_POSE * lanes, kept.poses, kept.pose_errors, j)
+            before = inputs.pose_t[j]
+            j += 1
+        if (i == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
+            return
+        # Velocities live at mid-step: commands from the last middle to this one, less the delay, on the log's clock.
+        begin = ((n - 0.5) * dt - delay) / stretch
+        end = ((n + 0.5) * dt - delay) / stretch
+        while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
+            at += 1
+        share = stretch / dt
+        left = _held(inputs.commands, inputs.t, 0, at, begin, end, cap) * share
+        right = _held(inputs.commands, inputs.t, 1, at, begin, end, cap) * share
+        _advance(left, right, inputs.bench, flat, lanes, effects)
+        n += 1
+
+
+def _replay_kernel(lanes: int, effects: bool) -> Any:
+    """Return the compiled replay of so many robots, with effects or plain ones."""
+
+    def replay(
+        inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
+        flat: Array, weights: Array, kept: Kept,
+    ) -> None:  # fmt: skip
+        _replay(inputs, physics, start, offset, dt, flat, weights, kept, lanes, effects)
+
+    return kernel(replay)
+
+
+_replay_one = _replay_kernel(1, effects=True)
+_replay_lanes, _replay_plain_lanes = _replay_kernel(LANES, effects=True), _replay_kernel(LANES, effects=False)
+
+
+def replay_rows(
+    inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float, predictions: bool
+) -> Kept:
+    """Replay a recording by one robot, or by `LANES` of them in lock step.
 
     Parameters
     ----------
     inputs
         The recording.
-    physics, derived, state
-        Records, shape (1,) each; the last two are overwritten.
+    physics
+        Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`.
     start
         Start pose of the axle's centre [m, m, rad], shape (3,).
     offset
-        How late this recording's camera clock is, besides the robot's ``pose_delay`` [s].
+        How late this recording's camera clock is, besides the robots' ``pose_delay`` [s].
     dt
         Step [s].
-    rows, row_errors
-        Overwritten: predictions, shape (rows, ROW_COLUMNS), and normalised residuals, shape (rows, 4).
-    poses, pose_errors
-        Overwritten: predicted poses and normalised residuals, shape (poses, 3).
+    predictions
+        Whether to keep what is predicted, not only how far measurements are off.
     """
-    p, c, s = physics[0], derived[0], state[0]
-    derive(p, dt, c)
-    place(s, p, start[0], start[1], start[2])
-    stretch = 1.0 / (1.0 + p.clock_skew)
-    late = p.pose_delay + offset
-    last = np.zeros(4)
-    before = np.array([start[0], start[1], 0.0])
-    spread = np.zeros((3, 3))
-    shift = np.zeros(3)
-    for k in range(3):
-        spread[k, k] = 0.01  # the start pose is known to 0.1 m and 6 degrees: to nothing, beside what follows
-    i = _compare_rows(0, 0.0, stretch, inputs, s, p, rows, row_errors, last)
-    j = _compare_poses(0, 0.0, stretch, late, inputs, s, p, poses, pose_errors, before, spread, shift)
-    at = -1
-    n = 0
-    while (i < inputs.t.shape[0] or j < inputs.pose_t.shape[0]) and n < 100_000_000:
-        # Velocities live at mid-step: commands from the last middle to this one, less the delay, on the log's clock.
-        begin = ((n - 0.5) * dt - p.actuation_delay) / stretch
-        end = ((n + 0.5) * dt - p.actuation_delay) / stretch
-        while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
-            at += 1
-        share = stretch / dt
-        left = _held(inputs.commands, inputs.t, 0, at, begin, end, p.duty_cap) * share
-        right = _held(inputs.commands, inputs.t, 1, at, begin, end, p.duty_cap) * share
-        if inputs.bench:
-            bench_step(s, left, right, p, c)
-        else:
-            step(s, left, right, p, c)
-            drift(s, c)
-        n += 1
-        if i < inputs.t.shape[0] and inputs.t[i] * stretch <= n * dt + 1e-9:
-            i = _compare_rows(i, n * dt, stretch, inputs, s, p, rows, row_errors, last)
-        if j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= n * dt + 1e-9:
-            j = _compare_poses(
-                j, n * dt, stretch, late, inputs, s, p, poses, pose_errors, before, spread, shift
-            )
+    lanes, n, m = len(physics), len(inputs.t), len(inputs.pose_t)
+    shapes = (n * predictions, ROW_COLUMNS), (n, 4), (m * predictions, 3), (m, 3)
+    kept = Kept(*(np.empty((rows, columns * lanes)) for rows, columns in shapes))
+    play = _replay_one if lanes == 1 else _replay_plain_lanes if is_plain(physics).all() else _replay_lanes
+    play(inputs, physics, start, offset, dt, lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(4), kept)
+    return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

@@ -6,7 +6,7 @@ replay(recording, robot, memory_s=1)   # re-based on the measurement, over about
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,8 +16,10 @@ from scipy.optimize import least_squares
 
 from gecar.reality.recordings.camera_frame import axle_pose
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.replay.kernel import ROW_COLUMNS, KernelInput, replay_rows
-from gecar.world.kernel.state import DERIVED, STATE
+from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
+from gecar.reality.replay.kernel_data import KernelInput
+from gecar.world.kernel.dynamics import is_plain
+from gecar.world.lock_step import LANES
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
 
@@ -28,6 +30,7 @@ USUAL_NOISE = (0.29 * DEG, 0.01, 0.5 * DEG, 0.001, 0.3 * DEG)
 USUAL_WALK = (3e-4, 0.1 * DEG)  # m/sqrt(s), rad/sqrt(s)
 # A command acts from the log's zero where its first row comes at most this much later.
 LATEST_FIRST_ROW_S = 0.1
+FEWEST_LANES = 4  # fewer robots are replayed faster one by one
 
 
 @dataclass(frozen=True)
@@ -138,16 +141,34 @@ class Replayer:
 
     def play(self, physics: npt.NDArray[Any], start: Array | None = None) -> Prediction:
         """Replay under a physics record of shape (1,), from the recorded start or another [m, m, rad]."""
-        rows, poses = len(self.inputs.t), len(self.inputs.pose_t)
-        out = np.empty((rows, ROW_COLUMNS)), np.empty((rows, 4)), np.empty((poses, 3)), np.empty((poses, 3))
         chosen = self.start if start is None else start
+        kept = replay_rows(self.inputs, self._capped(physics), chosen, self.clock_offset_s, STEP_S, True)
+        rows, row_errors, poses, pose_errors = (array[:, :, 0] for array in kept)
+        return Prediction(rows[self.first_row :], row_errors[self.first_row :], poses, pose_errors)
+
+    def errors(self, physics: npt.NDArray[Any]) -> Array:
+        """Return the normalised residuals of replays under n physics records, shape (n, 4 rows + 3 poses).
+
+        Those of encoders, battery and gyro, channel by channel, then those of the poses.
+        """
+        physics = self._capped(physics)
+        rows, poses = len(self.t), len(self.inputs.pose_t)
+        out = np.empty((len(physics), 4 * rows + 3 * poses))
+        for some in _in_step(physics):
+            robots = physics[np.resize(some, LANES if len(some) > 1 else 1)]
+            kept = replay_rows(self.inputs, robots, self.start, self.clock_offset_s, STEP_S, False)
+            for lane, number in enumerate(some):
+                out[number, : 4 * rows].reshape(4, rows)[:] = kept.row_errors[self.first_row :, :, lane].T
+                out[number, 4 * rows :].reshape(3, poses)[:] = kept.pose_errors[:, :, lane].T
+        return out
+
+    def _capped(self, physics: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return physics records with the recording's own cap on duty, where it has one."""
         cap = self.recording.setup.duty_cap
         if cap is not None:
             physics = physics.copy()
             physics["duty_cap"] = cap
-        derived, state = np.zeros(1, DERIVED), np.zeros(1, STATE)
-        replay_rows(self.inputs, physics, derived, state, chosen, self.clock_offset_s, STEP_S, *out)
-        return Prediction(out[0][self.first_row :], out[1][self.first_row :], out[2], out[3])
+        return physics
 
     def aligned_start(self, physics: npt.NDArray[Any], within_s: float = np.inf) -> Array:
         """Return the start pose whose open-loop replay fits the poses best, shape (3,) [m, m, rad].
@@ -200,6 +221,17 @@ def replayer_of(
         r.setup.rig == "bench",
     )  # fmt: skip
     return Replayer(recording, inputs, pose, _first_pose(pose))
+
+
+def _in_step(physics: npt.NDArray[Any]) -> Iterator[list[int]]:
+    """Yield which records to replay together: up to `LANES` that share `TIMING`, plain ones apart; few one by one."""
+    alike: dict[Any, list[int]] = {}
+    for number, key in enumerate(zip(physics[list(TIMING)].tolist(), is_plain(physics), strict=True)):
+        alike.setdefault(key, []).append(number)
+    for numbers in alike.values():
+        for first in range(0, len(numbers), LANES):
+            some = numbers[first : first + LANES]
+            yield from [some] if len(some) >= FEWEST_LANES else [[number] for number in some]
 
 
 def _first_pose(pose: Array) -> Array:

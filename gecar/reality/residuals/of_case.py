@@ -48,12 +48,16 @@ class Residuals:
 
     def errors(self, physics: Physics) -> Array:
         """Return the whitened residuals, shape (n,); samples that were not measured are left out."""
+        return self.errors_of_each(physics)[0]
+
+    def errors_of_each(self, physics: Physics) -> Array:
+        """Return the same under m physics records, shape (m, n)."""
         if not self.recordings:
-            return np.zeros(0)
+            return np.zeros((len(physics), 0))
         parts = self.threads.map(
             lambda r: r.sensor_errors(physics) if self.sensor else r.motion_errors(physics), self.recordings
         )
-        everything = np.concatenate(parts)[self._located[1]]
+        everything = np.concatenate(parts, axis=1)[:, self._located[1]]
         return np.clip(np.nan_to_num(everything, nan=LARGEST), -LARGEST, LARGEST)
 
     @cached_property

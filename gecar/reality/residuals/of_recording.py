@@ -134,14 +134,14 @@ class RecordingResiduals:
         return self._along(path.poses, physics, shift, late)
 
     def motion_errors(self, physics: Physics) -> Array:
-        """Return the residuals of motion, shape (n,), channel by channel."""
-        predicted = self.replayer.play(physics)
-        return np.concatenate([predicted.row_errors.T.ravel(), predicted.pose_errors.T.ravel()])
+        """Return the residuals of motion under m physics records, shape (m, n), channel by channel."""
+        return self.replayer.errors(physics)
 
     def sensor_errors(self, physics: Physics) -> Array:
-        """Return the residuals of the colour sensor, shape (rows,)."""
+        """Return the residuals of the colour sensor under m physics records, shape (m, rows)."""
         assert self.nuisances.path is not None
-        return (self.recording.reflection_pct - self.readings(physics)) / self.nuisances.path.reading_sd
+        readings = np.array([self.readings(physics[k : k + 1]) for k in range(len(physics))])
+        return (self.recording.reflection_pct - readings) / self.nuisances.path.reading_sd
 
     def motion_index(self, number: int) -> tuple[ResidualIndex, Mask]:
         """Return where residuals of motion come from, as that recording of a case, and which of them there are."""
