@@ -152,7 +152,8 @@ class Search:
 
         bounds = np.tile(FARTHEST, k)
         best, least = cma_es(
-            lambda numbers: self.drive(points(numbers))[0], np.zeros(4 * k), np.tile(SPREAD, k), (-bounds, bounds),
+            lambda tried: np.array([self.drive(points(numbers))[0] for numbers in tried]),
+            np.zeros(4 * k), np.tile(SPREAD, k), (-bounds, bounds),
             np.random.default_rng(seed), generations, wider, patience=60, least_gain=0.002,
         )  # fmt: skip
         return least, points(best)

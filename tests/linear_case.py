@@ -51,10 +51,14 @@ class LinearResiduals:
         )
 
     def errors(self, physics: np.ndarray) -> np.ndarray:
-        out = self.noise.copy()
+        return self.errors_of_each(physics)[0]
+
+    def errors_of_each(self, physics: np.ndarray) -> np.ndarray:
+        out = np.tile(self.noise, (len(physics), 1))
         for effect, response in self.responses.items():
             c = free(EV3, [effect]).coordinates[0]
-            out += response * (self.truth.get(effect, 0.0) - c.at(float(physics[c.parameter.field][0])))
+            for row, value in enumerate(physics[c.parameter.field]):
+                out[row] += response * (self.truth.get(effect, 0.0) - c.at(float(value)))
         return out
 
 

@@ -58,7 +58,7 @@ def _most(robot: Robot, which: int, seed: int, seconds: float, pieces: int) -> f
     rng, one = np.random.default_rng(seed), np.ones(2 * pieces)
     found = [
         cma_es(
-            lambda v: -beyond_the_bound(robot, v.reshape(pieces, 2), seconds)[which],
+            lambda vs: np.array([-beyond_the_bound(robot, v.reshape(pieces, 2), seconds)[which] for v in vs]),
             np.tile(start, pieces), 0.5 * one, (-one, one), rng, generations=6, least_gain=1e-4,
         )[1]
         for start in ((1.0, 1.0), (1.0, -0.9), (-1.0, 0.0))

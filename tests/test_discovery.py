@@ -122,7 +122,7 @@ def test_breakaway_friction_is_looked_for_within_the_speeds_recorded(share: floa
     )
     speeds = [
         start["speed_rad_s"]
-        for start in initial_values("static_friction", EV3, [slow], lambda values: np.zeros(9))
+        for start in initial_values("static_friction", EV3, [slow], lambda tried: np.zeros((len(tried), 9)))
     ]
     assert min(speeds) == pytest.approx(first, abs=0.1)
     assert max(speeds) == pytest.approx(3.0) if first else max(speeds) < 0.3
@@ -138,7 +138,9 @@ def test_every_effect_has_places_to_start_from_whichever_columns_are_missing(
     blind = replace(run, **{name: np.full_like(getattr(run, name), np.nan) for name in missing})
     for effect in CATALOGUE:
         freedom = free(EV3, [effect.id])
-        begun = initial_values(effect.id, EV3, [blind], lambda values: np.array(list(values.values())))
+        begun = initial_values(
+            effect.id, EV3, [blind], lambda tried: np.array([list(values.values()) for values in tried])
+        )
         assert begun or effect.id == "slippery_patch"
         assert all(np.isfinite(freedom.vector({effect.id: s})).all() for s in begun)
 
@@ -228,7 +230,14 @@ def test_cma_es_finds_the_bottom_of_a_jagged_bowl() -> None:
         return float(np.sum((z - 0.7) ** 2) + 0.05 * np.sum(np.cos(40 * z)))
 
     bounds = np.full(3, -5.0), np.full(3, 5.0)
-    found, cost = cma_es(jagged, np.zeros(3), np.ones(3), bounds, np.random.default_rng(0), 60)
+    found, cost = cma_es(
+        lambda tried: np.array([jagged(z) for z in tried]),
+        np.zeros(3),
+        np.ones(3),
+        bounds,
+        np.random.default_rng(0),
+        60,
+    )
     assert np.all(np.abs(found - 0.7) < 0.2)
     assert cost < 0.0
 

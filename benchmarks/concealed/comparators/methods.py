@@ -84,8 +84,8 @@ def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]
     parameters = free(estimator.robot, (*model.effects, effect))
     residual = estimator.residual(parameters)
 
-    def errors(values: Mapping[str, float]) -> Array:
-        return residual(parameters.vector({**model.values, effect: values}))
+    def errors(tried: Sequence[Mapping[str, float]]) -> Array:
+        return residual(np.array([parameters.vector({**model.values, effect: values}) for values in tried]))
 
     begun = initial_values(effect, estimator.robot, problem.recordings, errors)
     places = [{**model.values, effect: v} for v in begun]

@@ -104,6 +104,6 @@ def _named(constants: Sequence[Constant], fields: Sequence[str]) -> Chosen:
 
 
 def _whole(z: Array, free: Chosen, part: Array) -> Array:
-    out = z.copy()
-    out[free] = part
+    out = np.broadcast_to(z, (*part.shape[:-1], len(z))).copy()
+    out[..., free] = part
     return out

@@ -145,19 +145,31 @@ class FreeConstants:
         return np.asarray(self.standing + z * self.steps)
 
     def physics(self, z: Array) -> npt.NDArray[Any]:
-        """Return the physics record of a vector, shape (1,)."""
-        record = self.robot.physics
-        for constant, value in zip(self.constants, self.values(z), strict=True):
+        """Return the physics records of m vectors, shape (m, k) to (m,)."""
+        records = np.repeat(self.robot.physics, len(z))
+        for constant, column in zip(self.constants, self.values(z).T, strict=True):
             if constant.kernel not in MARK:
-                record[constant.kernel] = value
-        return record
+                records[constant.kernel] = column
+        return records
 
     def errors(self, residuals: Residuals, z: Array) -> Array:
-        """Return a residuals's residuals at a vector; those of motion, with the poses as its mark has them."""
-        if not residuals.sensor:
-            found = dict(zip((c.kernel for c in self.constants), self.values(z), strict=True))
-            residuals = residuals.with_mark([found.get(field, 0.0) for field in MARK])
-        return residuals.errors(self.physics(z))
+        """Return residuals at a vector, shape (k,) to (n,), or at m of them, (m, k) to (m, n).
+
+        Those of motion are of the poses as the vector's mark has them.
+        """
+        vectors = np.atleast_2d(z)
+        if residuals.sensor:
+            found = residuals.errors_of_each(self.physics(vectors))
+        else:
+            marks = np.zeros((len(vectors), len(MARK)))
+            for constant, column in zip(self.constants, self.values(vectors).T, strict=True):
+                if constant.kernel in MARK:
+                    marks[:, MARK.index(constant.kernel)] = column
+            found = np.empty((len(vectors), len(residuals.index.t_s)))
+            for mark in np.unique(marks, axis=0):
+                alike = (marks == mark).all(axis=1)
+                found[alike] = residuals.with_mark(mark).errors_of_each(self.physics(vectors[alike]))
+        return found if z.ndim == 2 else found[0]
 
 
 def with_constants(robot: Robot, values: Mapping[str, float], name: str | None = None) -> Robot:

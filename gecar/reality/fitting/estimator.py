@@ -11,7 +11,14 @@ from gecar.reality.fitting.model import NOTHING_TOLERATED, Effects, Model
 from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
-from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares, weights
+from gecar.reality.optimisation.least_squares import (
+    Minimum,
+    Residual,
+    cost,
+    cost_of_each,
+    least_squares,
+    weights,
+)
 from gecar.reality.residuals.of_case import Residuals
 from gecar.world.robot import Robot
 
@@ -43,17 +50,26 @@ class Estimator:
         """Return the robot as it is known, with nothing fitted."""
         return self._model((), np.zeros(0), NOTHING_TOLERATED)
 
-    def residual(
-        self, parameters: Parameters, tolerated: Array = NOTHING_TOLERATED
-    ) -> Callable[[Array], Array]:
+    def residual(self, parameters: Parameters, tolerated: Array = NOTHING_TOLERATED) -> Residual:
         """Return the function that fits minimise."""
-        return lambda z: self.residuals.errors(parameters.physics(z)) - tolerated
 
-    def trial(self, model: Model, effect: str) -> Callable[[Mapping[str, float]], Array]:
-        """Return the function from values of one more effect, by label, to a model's residuals under it."""
+        def residual(z: Array) -> Array:
+            errors = self.residuals.errors_of_each(parameters.physics(z)) - tolerated
+            return errors if z.ndim == 2 else errors[0]
+
+        return residual
+
+    def trial(self, model: Model, effect: str) -> Callable[[Sequence[Mapping[str, float]]], Array]:
+        """Return the function from m values of one more effect, by label, to a model's residuals, shape (m, n)."""
         parameters = free(self.robot, (*model.effects, effect))
         residual = self.residual(parameters, model.tolerated)
-        return lambda values: residual(parameters.vector({**model.values, effect: values}))
+
+        def errors(tried: Sequence[Mapping[str, float]]) -> Array:
+            return residual(
+                np.array([parameters.vector({**model.values, effect: values}) for values in tried])
+            )
+
+        return errors
 
     def fit(
         self,
@@ -85,26 +101,27 @@ class Estimator:
         """Search about a fit without derivatives; return the better one."""
         parameters, residual = model.parameters, self.residual(model.parameters, model.tolerated)
         wide = np.array([spread * c.parameter.search_spread for c in parameters.coordinates])
-        z, least = cma_es(lambda at: cost(residual(at)), model.z, wide, parameters.bounds, self.rng)
+        z, least = cma_es(lambda at: cost_of_each(residual, at), model.z, wide, parameters.bounds, self.rng)
         return model if least >= model.cost else self.at(model, z)
 
-    def sensitivities(self, model: Model, effect: str) -> Array:
-        """Return the residuals' derivatives by the parameters of an effect, the model's or one more, shape (n, k).
+    def sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
+        """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k).
 
         What is tolerated changes no derivative, so models with the same fit share theirs; those of the last few fits
         are kept.
         """
         key = (model.effects, model.z.tobytes())
         cached = self._cache.setdefault(key, {})
-        if effect not in cached:
-            cached[effect] = self._differences(model, effect)
+        missing = [effect for effect in effects if effect not in cached]
+        if missing:
+            cached.update(zip(missing, self._differences(model, missing), strict=True))
         while len(self._cache) > CACHED_FITS:
             self._cache.pop(next(iter(self._cache)))
-        return cached[effect]
+        return [cached[effect] for effect in effects]
 
     def own_sensitivities(self, model: Model) -> Array:
         """Return the residuals' derivatives by a model's own parameters, shape (n, parameters)."""
-        columns = [self.sensitivities(model, effect) for effect in model.effects]
+        columns = self.sensitivities(model, model.effects)
         return np.concatenate([np.zeros((len(model.errors), 0)), *columns], axis=1)
 
     def projection(self, model: Model) -> Callable[[Array], Array]:
@@ -129,7 +146,7 @@ class Estimator:
         Source: Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
         """
         w = np.sqrt(weights(model.errors))
-        g = self.projection(model)(self.sensitivities(model, effect))
+        g = self.projection(model)(self.sensitivities(model, [effect])[0])
         if not g.shape[1]:
             return 0.0
         return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.errors)) ** 2))
@@ -140,16 +157,17 @@ class Estimator:
         found = Minimum(z, errors, cost(errors))
         return Model(effects, parameters, found, self.blocks.excess_energy(errors), tolerated)
 
-    def _differences(self, model: Model, effect: str) -> Array:
-        own = effect in model.effects
-        parameters = free(self.robot, model.effects if own else (*model.effects, effect))
-        z, high, residual = parameters.vector(model.values), parameters.bounds[1], self.residual(parameters)
-        raw = model.errors + model.tolerated
-        columns = []
-        for k, c in enumerate(parameters.coordinates):
-            if c.effect.id == effect:
-                moved = z.copy()
-                step = c.probe if z[k] + c.probe <= high[k] else -c.probe
-                moved[k] += step
-                columns.append((residual(moved) - raw) / step)
-        return np.stack(columns, axis=1)
+    def _differences(self, model: Model, effects: Sequence[str]) -> list[Array]:
+        raw, steps, moved = model.errors + model.tolerated, [], []
+        for effect in effects:
+            own = effect in model.effects
+            parameters = free(self.robot, model.effects if own else (*model.effects, effect))
+            z, high = parameters.vector(model.values), parameters.bounds[1]
+            of_effect = [k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect]
+            probes = parameters.probes[of_effect]
+            steps.append(np.where(z[of_effect] + probes <= high[of_effect], probes, -probes))
+            vectors = np.tile(z, (len(of_effect), 1))
+            vectors[range(len(of_effect)), of_effect] += steps[-1]
+            moved.append(parameters.physics(vectors))
+        found = iter(self.residuals.errors_of_each(np.concatenate(moved)))
+        return [np.stack([(next(found) - raw) / step for step in each], axis=1) for each in steps]

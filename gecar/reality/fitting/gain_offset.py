@@ -10,14 +10,13 @@ Source: regression to the mean where what is regressed on has errors, Fuller, Me
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.profile import reaches, refitted
+from gecar.reality.optimisation.least_squares import Residual
 
 Array = npt.NDArray[np.float64]
 
@@ -47,7 +46,7 @@ def _own(model: Model) -> npt.NDArray[np.intp]:
     return np.flatnonzero([c.effect.id == EFFECT for c in model.parameters.coordinates])
 
 
-def _weighted(estimator: Estimator, model: Model) -> Callable[[Array], Array]:
+def _weighted(estimator: Estimator, model: Model) -> Residual:
     residual = estimator.residual(model.parameters, model.tolerated)
     sd, even = estimator.residuals.reading_sd, estimator.residuals.recordings[0].noise.reflection_sd
     weight = np.where(sd > EVEN * even, 1.0 / EDGE_CAUTION, 1.0)

@@ -15,24 +15,26 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.parameters import Coordinate, free, torque_scale
-from gecar.reality.optimisation.least_squares import cost, weights
+from gecar.reality.optimisation.least_squares import cost, cost_of_each, residuals_of_each, weights
 from gecar.reality.recordings.recording import Recording
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
+Errors = Callable[[Sequence[Values]], Array]
 
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (3.0, 12.0)  # in steps worth a name
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
+CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 PATCH_RADII_M = (0.1, 0.15, 0.2, 0.3)
 
 
 def initial_values(
-    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Errors
 ) -> list[Values]:
     """Return values of an effect's parameters to start from, by label.
 
@@ -45,7 +47,7 @@ def initial_values(
     recordings
         Of that robot.
     errors
-        Returns the residuals under the effect with given values.
+        Returns the residuals under the effect with several values, shape (values, n).
     """
     effect = BY_ID[effect_id]
     if effect.starts:
@@ -56,7 +58,7 @@ def initial_values(
 
 
 def responses(
-    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Errors
 ) -> Iterator[Array]:
     """Yield what residuals do in every direction that a search from these starting values looks in, shape (n, k).
 
@@ -64,16 +66,16 @@ def responses(
     are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much.
     """
     effect = BY_ID[effect_id]
-    bare = errors({})
+    bare = errors([{}])[0]
     if effect.scan == "shaft cycles":
         yield from (-basis for _, _, basis in _ripples(robot, recordings, errors))
         return
-    values: Iterable[Values] = ()
+    values: Sequence[Values] = ()
     if effect.scan == "floor cells":
-        values = (_patch(*cell, radius) for cell in _cells(recordings) for radius in PATCH_RADII_M)
+        values = [_patch(*cell, radius) for cell in _cells(recordings) for radius in PATCH_RADII_M]
     elif effect.starts or effect.scan:
         values = initial_values(effect_id, robot, recordings, errors)
-    yield from ((bare - errors(each))[:, None] for each in values)
+    yield from ((bare - each)[:, None] for each in residuals_of_each(errors, values))
 
 
 def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
@@ -119,39 +121,39 @@ def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
         yield {"duty_pct": float(edge), "offset_share": 0.0}
 
 
-def _shaft_cycles(
-    robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
-) -> Iterator[Values]:
+def _shaft_cycles(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
     """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
 
     Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
     either shaft do, and least squares gives both phases at once.
     """
-    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
+    bare = errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
     w, least = np.sqrt(weights(bare)), cost(bare)
+    tried = []
     for cycles, size, basis in _ripples(robot, recordings, errors):
         a, b, c, d = -np.linalg.lstsq(w[:, None] * basis, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
         phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
         # Least squares asks for too little: a ripple runs out of step with the simulation.
-        for share in (1.0, 2.0, 4.0):
-            found, opposite = (_rippled(cycles, *pair, share * most) for pair in phases)
-            gain, other = (least - cost(errors(values)) for values in (found, opposite))
-            if other < PHASE_COUNTS * gain:
-                yield found
+        tried += [_rippled(cycles, *pair, share * most) for share in (1.0, 2.0, 4.0) for pair in phases]
+    gains = least - cost_of_each(errors, tried)
+    for found, gain, opposite in zip(tried[::2], gains[::2], gains[1::2], strict=True):
+        if opposite < PHASE_COUNTS * gain:
+            yield found
 
 
 def _ripples(
-    robot: Robot, recordings: Sequence[Recording], errors: Callable[[Values], Array]
+    robot: Robot, recordings: Sequence[Recording], errors: Errors
 ) -> Iterator[tuple[int, float, Array]]:
     """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
     turned = max(_turned(r, robot) for r in recordings)
     size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
-    bare = errors(_rippled(1, 0.0, 0.0, 0.0))
-    for cycles in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48):
-        if cycles * turned >= LEAST_CYCLES:
-            pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
-            sines, sine, cosines, cosine = (errors(_rippled(cycles, *p, size)) - bare for p in pairs)
+    bare = errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
+    pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
+    scanned = [cycles for cycles in CYCLES if cycles * turned >= LEAST_CYCLES]
+    for two in (scanned[first : first + 2] for first in range(0, len(scanned), 2)):
+        waves = errors([_rippled(cycles, *pair, size) for cycles in two for pair in pairs]) - bare
+        for cycles, (sines, sine, cosines, cosine) in zip(two, np.split(waves, len(two)), strict=True):
             basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
             yield cycles, size, basis
 
@@ -179,12 +181,12 @@ def _wheel_angles(recording: Recording) -> Array:
     return np.nan_to_num(np.column_stack([recording.left_angle_rad, recording.right_angle_rad]))
 
 
-def _floor_cells(recordings: Sequence[Recording], errors: Callable[[Values], Array]) -> Iterator[Values]:
+def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
     """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
     tried = [_patch(x, y, PATCH_RADII_M[0]) for x, y in _cells(recordings)]
-    tried.sort(key=lambda values: cost(errors(values)))
+    best = [tried[k] for k in np.argsort(cost_of_each(errors, tried), kind="stable")[:BEST_CELLS]]
     half = 0.5 * PATCH_PITCH_M
-    for values, radius, grip in itertools.product(tried[:BEST_CELLS], PATCH_RADII_M, (0.06, 0.15, 0.3)):
+    for values, radius, grip in itertools.product(best, PATCH_RADII_M, (0.06, 0.15, 0.3)):
         for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
             yield {
                 "radius_m": radius,
@@ -223,7 +225,7 @@ def _mounts(robot: Robot) -> Iterator[Values]:
             yield {"ahead_m": max(sensor.ahead + ahead, 0.0), "left_m": sensor.left + left}
 
 
-Scan = Callable[[Robot, Sequence[Recording], Callable[[Values], Array]], Iterable[Values]]
+Scan = Callable[[Robot, Sequence[Recording], Errors], Iterable[Values]]
 _SCANS: dict[str, Scan] = {
     "slow speeds": lambda robot, recordings, errors: _slow_speeds(robot, recordings),  # noqa: ARG005
     "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005

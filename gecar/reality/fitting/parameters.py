@@ -123,11 +123,12 @@ class Parameters:
         return np.array([c.probe for c in self.coordinates], float)
 
     def physics(self, z: Array) -> npt.NDArray[Any]:
-        """Return the physics record of a vector, shape (1,)."""
-        record = self.robot.physics
-        for c, at in zip(self.coordinates, z, strict=True):
-            record[c.parameter.field] = c.value(float(at)) * c.parameter.si
-        return record
+        """Return the physics records of a vector, shape (size,), or of m of them, (m, size); shape (1,) or (m,)."""
+        vectors = np.atleast_2d(z)
+        records = np.repeat(self.robot.physics, len(vectors))
+        for c, column in zip(self.coordinates, vectors.T, strict=True):
+            records[c.parameter.field] = [c.value(at) * c.parameter.si for at in column.tolist()]
+        return records
 
     def values(self, z: Array) -> dict[str, dict[str, float]]:
         """Return a vector as effects of a robot file."""

@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.model import Model
-from gecar.reality.optimisation.least_squares import cost, least_squares
+from gecar.reality.optimisation.least_squares import Residual, cost, least_squares
 
 Array = npt.NDArray[np.float64]
-Residual = Callable[[Array], Array]
 
 RISE_95 = 1.92  # of cost: half the 95 % quantile of a chi-square with one degree of freedom
 FIRST, GROWTH, HALVINGS = 0.1, 1.5, 6
@@ -31,8 +30,8 @@ def refitted(
         return start, cost(residual(start))
 
     def whole(part: Array) -> Array:
-        z = start.copy()
-        z[free] = part
+        z = np.broadcast_to(start, (*part.shape[:-1], len(start))).copy()
+        z[..., free] = part
         return z
 
     low, high = model.parameters.bounds

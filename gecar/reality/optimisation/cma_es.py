@@ -19,7 +19,7 @@ LEAST_GAIN = 0.1  # of cost, a log likelihood: smaller gains do not restart the 
 
 
 def cma_es(
-    cost: Callable[[Array], float],
+    costs: Callable[[Array], Array],
     start: Array,
     spread: Array,
     bounds: tuple[Array, Array],
@@ -33,8 +33,8 @@ def cma_es(
 
     Parameters
     ----------
-    cost
-        What to minimise.
+    costs
+        What to minimise, at several vectors: shape (m, k) to (m,).
     start, spread
         Initial mean and standard deviations, shape (k,).
     bounds
@@ -50,12 +50,13 @@ def cma_es(
     """
     trials = wider * (7 + int(3 * math.log(len(start))) if len(start) > 1 else 6)
     strategy = _Strategy(len(start), trials)
-    best, least = np.clip(start, *bounds), cost(np.clip(start, *bounds))
+    best = np.clip(start, *bounds)
+    least = float(costs(best[None])[0])
     reference, since = least, 0
     for _ in range(generations):
         steps = strategy.ask(rng)
         places = np.clip(start + spread * (strategy.mean + strategy.sigma * steps), *bounds)
-        found = np.array([cost(place) for place in places])
+        found = costs(places)
         order = np.argsort(found)
         if found[order[0]] < least:
             best, least = places[order[0]], float(found[order[0]])

@@ -8,14 +8,16 @@ reweighting, Hartley and Zisserman, Multiple View Geometry (2nd ed.), appendix 6
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 KNEE = 4.0  # standard deviations beyond which a residual counts linearly
+TOGETHER = 32  # vectors of residuals, a megabyte or less each
 
 
 def cost(errors: Array) -> float:
@@ -57,21 +59,36 @@ class Minimum:
     cost: float
 
 
-def jacobian(
-    residual: Callable[[Array], Array], z: Array, errors: Array, probes: Array, high: Array
-) -> Array:
+Residual = Callable[[Array], Array]
+"""Whitened residuals at a vector, shape (k,) to (n,), or at m of them, shape (m, k) to (m, n)."""
+
+
+def row_by_row(residual: Residual) -> Residual:
+    """Return a function of one vector as one of several, too."""
+    return lambda z: residual(z) if z.ndim == 1 else np.array([residual(row) for row in z])
+
+
+def residuals_of_each(residual: Callable[[Any], Array], vectors: Any) -> Iterator[Array]:
+    """Yield the residuals at each of m vectors, shape (n,); only so many are held at a time."""
+    for first in range(0, len(vectors), TOGETHER):
+        yield from residual(vectors[first : first + TOGETHER])
+
+
+def cost_of_each(residual: Callable[[Any], Array], vectors: Any) -> Array:
+    """Return the robust cost at each of m vectors, shape (m,)."""
+    return np.array([cost(errors) for errors in residuals_of_each(residual, vectors)])
+
+
+def jacobian(residual: Residual, z: Array, errors: Array, probes: Array, high: Array) -> Array:
     """Return forward differences, backward where a bound is near, shape (n, k)."""
-    columns = np.empty((len(errors), len(z)))
-    for k in range(len(z)):
-        step = probes[k] if z[k] + probes[k] <= high[k] else -probes[k]
-        moved = z.copy()
-        moved[k] += step
-        columns[:, k] = (residual(moved) - errors) / step
-    return columns
+    steps = np.where(z + probes <= high, probes, -probes)
+    moved = np.tile(z, (len(z), 1))
+    np.fill_diagonal(moved, z + steps)
+    return np.ascontiguousarray(((residual(moved) - errors) / steps[:, None]).T)
 
 
 def least_squares(
-    residual: Callable[[Array], Array],
+    residual: Residual,
     start: Array,
     bounds: tuple[Array, Array],
     probes: Array,
@@ -83,7 +100,7 @@ def least_squares(
     Parameters
     ----------
     residual
-        Whitened residuals at a vector.
+        What is minimised.
     start, bounds
         Where to start, and the lowest and highest vectors.
     probes

@@ -62,8 +62,9 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
         return np.bincount(estimator.blocks.folds, costs(errors)).astype(float)
     w, residual = weights(errors), estimator.residual(model.parameters, model.tolerated)
     out = np.zeros(int(estimator.blocks.folds.max()) + 1)
+    folds, fitted = np.unique(estimator.blocks.folds), []
     normal = slopes.T @ (w[:, None] * slopes)
-    for k in np.unique(estimator.blocks.folds):
+    for k in folds:
         rows = estimator.blocks.folds == k
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * errors[rows])
@@ -73,6 +74,7 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
         block = rest[np.ix_(known, known)]
         ridge = RIDGE * np.diag(np.maximum(np.diag(block), 1e-9))
         without[known] = z[known] + np.linalg.solve(block + ridge, pull[known])
-        without = np.clip(without, *model.parameters.bounds)
-        out[k] = float(np.sum(costs(residual(without)[rows])))
+        fitted.append(np.clip(without, *model.parameters.bounds))
+    for k, found in zip(folds, residual(np.array(fitted)), strict=True):
+        out[k] = float(np.sum(costs(found[estimator.blocks.folds == k])))
     return out

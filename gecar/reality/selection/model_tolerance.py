@@ -49,8 +49,6 @@ def without_tolerated(problem: Problem, model: Model) -> Model:
 
 def small_sensitivities(estimator: Estimator, catalogue: Sequence[str], model: Model) -> list[Array]:
     """Return the derivatives by every size worth a name, a column each, by effect."""
-    out = []
-    for effect in catalogue:
-        named = [p.worthwhile > 0.0 for p in BY_ID[effect].parameters]
-        out.append(estimator.sensitivities(model, effect)[:, named])
-    return out
+    found = estimator.sensitivities(model, catalogue)
+    named = ([p.worthwhile > 0.0 for p in BY_ID[effect].parameters] for effect in catalogue)
+    return [slopes[:, columns] for slopes, columns in zip(found, named, strict=True)]

@@ -31,27 +31,26 @@ def largest_gains(estimator: Estimator, catalogue: Sequence[str], model: Model) 
     spans = int(estimator.blocks.spans.max()) + 1
     signs = estimator.rng.choice((-1.0, 1.0), (DRAWS, spans))
     best, projected = np.zeros(DRAWS), estimator.projection(model)
-    for effect in catalogue:
-        if effect not in model.effects:
-            for scores, searched in _scores(estimator, model, effect, projected):
-                drawn = signs @ scores
-                if (
-                    searched and drawn.shape[1] == 1
-                ):  # an effect at certain values, or more of it: never its opposite
-                    drawn = np.maximum(drawn, 0.0)
-                best = np.maximum(best, 0.5 * np.sum(drawn**2, axis=1))
+    others = [effect for effect in catalogue if effect not in model.effects]
+    for effect, slopes in zip(others, estimator.sensitivities(model, others), strict=True):
+        for scores, searched in _scores(estimator, model, effect, slopes, projected):
+            drawn = signs @ scores
+            if (
+                searched and drawn.shape[1] == 1
+            ):  # an effect at certain values, or more of it: never its opposite
+                drawn = np.maximum(drawn, 0.0)
+            best = np.maximum(best, 0.5 * np.sum(drawn**2, axis=1))
     return best
 
 
 def _scores(
-    estimator: Estimator, model: Model, effect: str, projected: Callable[[Array], Array]
+    estimator: Estimator, model: Model, effect: str, slopes: Array, projected: Callable[[Array], Array]
 ) -> Iterator[tuple[Array, bool]]:
     """Yield each span's scores in the directions fitted together, shape (spans, k), and whether they were searched."""
     weighted, of = np.sqrt(weights(model.errors)) * model.errors, estimator.blocks.spans
     recordings = [r.recording for r in estimator.residuals.recordings]
-    derivatives = [(estimator.sensitivities(model, effect), False)]
     found = responses(effect, estimator.robot, recordings, estimator.trial(model, effect))
-    for columns, searched in itertools.chain(derivatives, ((each, True) for each in found)):
+    for columns, searched in itertools.chain([(slopes, False)], ((each, True) for each in found)):
         g = projected(columns)
         if g.shape[1]:
             q = np.linalg.qr(g)[0]

@@ -14,7 +14,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.fitting.parameters import free as free_parameters
 from gecar.reality.optimisation.cma_es import cma_es
-from gecar.reality.optimisation.least_squares import Minimum, cost, least_squares
+from gecar.reality.optimisation.least_squares import Minimum, cost_of_each, least_squares
 from gecar.reality.selection.acceptance import is_worthwhile, worthwhile
 from gecar.reality.selection.model_tolerance import tolerated
 from gecar.reality.selection.problem import Problem
@@ -68,6 +68,7 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     estimator, small = problem.estimator, tolerated(problem, model)
     others = [e for e in problem.catalogue if e not in model.effects]
     bases = {e: estimator.tolerating(model, small[e]) for e in others}
+    estimator.sensitivities(model, others)  # all at once, in lock step
     trials = [t for t in (_scored(problem, bases[e], e) for e in others) if t]
     trials.sort(key=lambda t: -t.promise)
     if not trials or trials[0].promise < NEGLIGIBLE * problem.blocks:
@@ -99,7 +100,7 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
     if not values:
         return None
     starts = [parameters.vector({**model.values, effect: each}) for each in values]
-    found = np.array([cost(trial(each)) for each in values])
+    found = cost_of_each(trial, values)
     order = np.argsort(found)
     search = BY_ID[effect].search or USUAL
     kept = _apart([starts[k] for k in order], search.restarts, search.apart)
@@ -132,16 +133,16 @@ def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:
     low, high = parameters.bounds
     bounds = (low[own], high[own])
 
-    def cost_of(tail: Array) -> float:
-        return cost(residual(np.r_[model.z, tail]))
+    def costs_of(tails: Array) -> Array:
+        return cost_of_each(residual, np.column_stack([np.tile(model.z, (len(tails), 1)), tails]))
 
     starts = (*trial.starts, trial.minimum.z)
-    short = [cma_es(cost_of, z[own], spread, bounds, estimator.rng, SHORT) for z in starts]
+    short = [cma_es(costs_of, z[own], spread, bounds, estimator.rng, SHORT) for z in starts]
     short.sort(key=lambda pair: pair[1])
     best, least = trial.minimum.z, trial.minimum.cost
     for start, _ in short[: search.finalists]:
         tail, found = cma_es(
-            cost_of,
+            costs_of,
             start,
             FINALIST_SPREAD * spread,
             bounds,

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from gecar.reality.optimisation.least_squares import KNEE, least_squares
+from gecar.reality.optimisation.least_squares import KNEE, least_squares, row_by_row
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.start_pose.grid_search import FINE_SPOT_M, SAME_M, SAME_RAD, likely_starts, near
 from gecar.world.course.course import Course
@@ -190,7 +190,7 @@ class _ReadingMisfit:
                 return self.errors(with_other_wheels(path, change(z)), spot)
 
             far = np.full(free, FARTHEST)
-            found = least_squares(misfit, np.zeros(free), (-far, far), np.full(free, PROBE))
+            found = least_squares(row_by_row(misfit), np.zeros(free), (-far, far), np.full(free, PROBE))
             path, cost = with_other_wheels(path, change(found.z)), found.cost / self._there.sum()
         return path, cost
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.optimisation.least_squares import least_squares
+from gecar.reality.optimisation.least_squares import least_squares, row_by_row
 from gecar.reality.start_pose.localise import starting_at
 
 Array = npt.NDArray[np.float64]
@@ -58,5 +58,5 @@ def _nearby(path: Array, readings: Array, physics: Physics, predict: Predict) ->
         return errors[there] / READING_SD
 
     far = np.full(3, WITHIN)
-    found = least_squares(misfit, np.zeros(3), (-far, far), np.ones(3), rounds=6)
+    found = least_squares(row_by_row(misfit), np.zeros(3), (-far, far), np.ones(3), rounds=6)
     return starting_at(path, path[0] + found.z * STEPS), found.cost / max(int(there.sum()), 1)
