@@ -11,7 +11,7 @@ from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course.course import load_course
-from gecar.world.lock_step import LANES
+from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 

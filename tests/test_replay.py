@@ -13,7 +13,7 @@ from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.replayer import replay, replayer_of
 from gecar.world.effects import CATALOGUE
-from gecar.world.lock_step import LANES
+from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")

@@ -6,7 +6,7 @@ adds them up, wheel angles and pose, drifts for ever once it is wrong, so it is 
 wheel angles with a fixed memory, the pose by a Kalman filter on (x, y, heading), whose normalised innovations are
 the whitened residual. With an endless memory the replay is open loop from start to end.
 
-Robots that are told and seen at the same times are replayed in lock step (`gecar.world.lock_step`).
+Robots that are told and seen at the same times are replayed in lock step (`gecar.world.kernel.lock_step`).
 
 Source: prediction-error identification, Ljung, System Identification (2nd ed.), ch. 7.
 """
@@ -31,9 +31,7 @@ from gecar.reality.replay.pose_filter import (
     rebase,
 )
 from gecar.world.kernel.dynamics import is_plain
-from gecar.world.kernel.motor import bench_step, supply
-from gecar.world.kernel.state import derive, place
-from gecar.world.lock_step import (
+from gecar.world.kernel.lock_step import (
     LANES,
     N_FIELDS,
     advance_lanes,
@@ -47,6 +45,8 @@ from gecar.world.lock_step import (
     store_physics,
     store_state,
 )
+from gecar.world.kernel.motor import bench_step, supply
+from gecar.world.kernel.state import derive, place
 
 Array = npt.NDArray[np.float64]
 

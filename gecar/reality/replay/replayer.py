@@ -19,7 +19,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_data import KernelInput
 from gecar.world.kernel.dynamics import is_plain
-from gecar.world.lock_step import LANES
+from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
 

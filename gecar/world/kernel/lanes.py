@@ -1,8 +1,8 @@
 """Many drives in lock step: `LANES` robots at once, so that the compiler's vector instructions serve all of them.
 
 Every lane holds one drive: a program under its own conditions (robot, start, step, noise). All lanes go through a step
-together (`gecar.world.lock_step`); one whose drive has ended takes the next. What happens seldom, a program's statement
-or a new tile, is done lane by lane.
+together (`gecar.world.kernel.lock_step`); one whose drive has ended takes the next. What happens seldom, a program's
+statement or a new tile, is done lane by lane.
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from gecar.compiled import kernel, lane_access
 from gecar.world.kernel.conditions import Conditions
 from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, arrive, begin_program, tile_at
 from gecar.world.kernel.interpreter import CONTROL, EYES, Floor, look, run_program
-from gecar.world.kernel.sensing import RING, delayed
-from gecar.world.kernel.state import place
-from gecar.world.lock_step import (
+from gecar.world.kernel.lock_step import (
     LANES,
     N_FIELDS,
     advance_lanes,
@@ -32,6 +30,8 @@ from gecar.world.lock_step import (
     store_physics,
     store_state,
 )
+from gecar.world.kernel.sensing import RING, delayed
+from gecar.world.kernel.state import place
 
 # What a lane carries beside its robot: the commands of this step and the one before, after the cap; the tile; the step,
 # the one the program or the time limit waits for, and whether something has to be done now: then, or on another tile.
