@@ -136,7 +136,9 @@ def test_a_grammar_is_found_by_name_and_by_path(tmp_path: Path, monkeypatch: pyt
     assert alternatives(load_grammar("mine.bnf")) == [("mine",)]
     assert alternatives(load_grammar("ours")) == alternatives(load_grammar("ours.bnf")) == [("ours",)]
     assert load_grammar("rich").start == "<code>"
-    with pytest.raises(InputError, match=r"'none', expected a \.bnf file, or one of ours, paper, rich"):
+    with pytest.raises(
+        InputError, match=r"'none', expected a \.bnf file, or one of nested, ours, paper, rich"
+    ):
         load_grammar("none")
     with pytest.raises(InputError, match="directory"):
         load_grammar("grammars")

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import kernel, lane_access
-from gecar.reality.replay.kernel_data import Kept, KernelInput
+from gecar.reality.replay.kernel_input import Kept, KernelInput
 from gecar.reality.replay.pose_filter import (
     FILTER,
     POSE,

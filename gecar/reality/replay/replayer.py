@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from gecar.reality.recordings.camera_frame import axle_pose
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
-from gecar.reality.replay.kernel_data import KernelInput
+from gecar.reality.replay.kernel_input import KernelInput
 from gecar.world.kernel.dynamics import is_plain
 from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot

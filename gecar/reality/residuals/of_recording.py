@@ -140,7 +140,9 @@ class RecordingResiduals:
     def sensor_errors(self, physics: Physics) -> Array:
         """Return the residuals of the colour sensor under m physics records, shape (m, rows)."""
         assert self.nuisances.path is not None
-        readings = np.array([self.readings(physics[k : k + 1]) for k in range(len(physics))])
+        readings = np.zeros((len(physics), len(self.recording.t_s)))
+        for k in range(len(physics)):
+            readings[k] = self.readings(physics[k : k + 1])
         return (self.recording.reflection_pct - readings) / self.nuisances.path.reading_sd
 
     def motion_index(self, number: int) -> tuple[ResidualIndex, Mask]:
