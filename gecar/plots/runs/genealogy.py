@@ -225,7 +225,7 @@ def _draw_line(axes: Axes, lineage: Lineage, winner: Member, ranks: Ranks) -> No
             )
     if any(len(places) > 1 for places in lineage.family(winner)):
         axes.plot([], [], color=INK, linewidth=0.7, label="others it descends from")
-    axes.legend(ncols=5, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+    axes.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
 def _at(member: Member, ranks: Ranks) -> tuple[int, int]:
