@@ -24,10 +24,10 @@ from gecar.report.table import piped, seconds
 from gecar.results.cells import Cell, Record
 from gecar.results.config import configure
 from gecar.results.run import load_task
-from gecar.search.chance import arrivals, times_at_steps
+from gecar.search.chance import Arrivals, arrivals, times_at_steps, times_to_goal
 from gecar.world.course.course import list_courses
 from gecar.world.kernel.conditions import conditions
-from gecar.world.rollout import Fleet, Outcome, World
+from gecar.world.rollout import World
 
 OTHERS, OTHERS_SEED = 200, 900_000_011
 WITHIN = 0.02
@@ -43,9 +43,7 @@ def jittered(world: World, opcodes: npt.NDArray[np.int32]) -> float:
     spread = np.array([0.002, 0.002, np.radians(1.0)])
     starts = world.start + spread * np.random.default_rng(OTHERS_SEED).normal(size=(OTHERS, 3))
     under = conditions(np.repeat(world.robot.physics, OTHERS), world.step_s, starts, world.time_limit_s)
-    pairs = np.stack([np.zeros(OTHERS), np.arange(OTHERS)], axis=1)
-    summary, _ = Fleet(world).drive([opcodes], under, pairs, np.arange(OTHERS))
-    return float(np.mean(summary["outcome"] == Outcome.GOAL))
+    return Arrivals(times_to_goal(world, [opcodes], under, np.arange(OTHERS))[0]).share
 
 
 def figures(world: World, record: Record) -> tuple[bool, float, float, float]:

@@ -16,6 +16,11 @@ from gecar.language.mapping import Mapped
 P = TypeVar("P")
 
 
+def seed_of(content: bytes, seed: int) -> int:
+    """Return a seed for some content: its own, and always the same within runs of one seed."""
+    return int.from_bytes(hashlib.blake2b(content, digest_size=8, key=seed.to_bytes(8)).digest())
+
+
 class Problem(ABC, Generic[P]):
     """What an evolution must know of its programs; `read` and `meaning` are for subclasses to say."""
 
@@ -49,8 +54,7 @@ class Problem(ABC, Generic[P]):
 
     def seed(self, program: P, seed: int) -> int:
         """Return the seed of a program's noise: its own, and the same whenever a run with this seed meets it."""
-        digest = hashlib.blake2b(self.meaning(program), digest_size=8, key=seed.to_bytes(8)).digest()
-        return int.from_bytes(digest)
+        return seed_of(self.meaning(program), seed)
 
     def failed(self, n: int) -> Scores:
         """Return the scores of n genomes that map to no program."""

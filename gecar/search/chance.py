@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.scores import UNSOLVED
-from gecar.world.kernel.conditions import joined
+from gecar.world.kernel.conditions import Conditions, joined
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
 
@@ -115,22 +115,45 @@ def arrivals(
     seed
         Where they come from.
     """
-    under = drawn_conditions(world, draws, seed)
-    pairs = np.stack(np.divmod(np.arange(len(programs) * draws), draws), axis=1)
-    summary, _ = Fleet(world).drive(programs, under, pairs, np.arange(len(pairs)) % draws + 1)
-    times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
-    return [Arrivals(row) for row in times.reshape(len(programs), draws)]
+    times = times_to_goal(world, programs, drawn_conditions(world, draws, seed), np.arange(draws) + 1)
+    return [Arrivals(row) for row in times]
+
+
+def times_to_goal(
+    world: World, programs: Sequence[npt.NDArray[np.int32]], under: Conditions, streams: npt.ArrayLike
+) -> Floats:
+    """Drive every program under all conditions; return times to GOAL [s], inf where it is missed.
+
+    Parameters
+    ----------
+    world
+        Robot and course.
+    programs
+        Opcodes.
+    under
+        n conditions.
+    streams
+        Seed of the noise under each, shape (n,), or one for all.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (programs, n).
+    """
+    shape = len(programs), len(under)
+    pairs = np.stack(np.divmod(np.arange(len(programs) * len(under)), len(under)), axis=1)
+    summary, _ = Fleet(world).drive(programs, under, pairs, np.broadcast_to(streams, shape).ravel())
+    times: Floats = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+    return times.reshape(shape)
 
 
 def drives_at_steps(
     world: World, programs: Sequence[npt.NDArray[np.int32]], steps_s: Sequence[float], seed: int = 0
 ) -> Floats:
     """Return the nominal robot's times to GOAL at other steps [s], inf where it misses it, shape (programs, steps)."""
-    under = joined([replace(world, step_s=step).nominal for step in steps_s])
-    pairs = np.stack(np.divmod(np.arange(len(programs) * len(under)), len(under)), axis=1)
-    summary, _ = Fleet(world).drive(programs, under, pairs, np.full(len(pairs), seed))
-    times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
-    return times.reshape(len(programs), len(under))
+    return times_to_goal(
+        world, programs, joined([replace(world, step_s=step).nominal for step in steps_s]), seed
+    )
 
 
 def times_at_steps(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0) -> dict[str, float | None]:
@@ -156,7 +179,7 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
     world's own) come before those that owe their time to one step; of those as good, the shortest is taken.
     """
     at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
-    unsteady = ~(at_steps.max(axis=1) <= STEADY * at_steps.min(axis=1))
+    unsteady = at_steps.max(axis=1) > STEADY * at_steps.min(axis=1)
     first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
     order = np.lexsort(([merit_of(times, share) for times in first], unsteady))
     left = order[: max(1, (len(order) + 3) // 4)].tolist()
@@ -165,11 +188,10 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)
     ]
-    merits = np.array([merit_of(times, share) for times in both])
-    best = np.lexsort((merits, unsteady[left]))[0]
-    as_good = (merits <= AS_GOOD * merits[best]) & (unsteady[left] == unsteady[left][best])
-    lengths = np.array([len(programs[k]) for k in left])
-    return int(left[int(np.lexsort((merits, lengths, ~as_good))[0])])
+    merits, last = np.array([merit_of(times, share) for times in both]), unsteady[left]
+    best = np.lexsort((merits, last))[0]
+    as_good = np.flatnonzero((merits <= AS_GOOD * merits[best]) & (last == last[best]))
+    return int(left[min(as_good, key=lambda k: (len(programs[left[k]]), merits[k]))])
 
 
 _CHOICE, REPORT = 1_000_003, 1_000_033

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.evolution.problem import Problem
+from gecar.evolution.problem import Problem, seed_of
 from gecar.evolution.scores import Floats, Scores
 from gecar.language.mapping import Mapped
 from gecar.language.opcodes import LINE, MAX_DUTY_PCT, NOT_EQUAL, A, B
@@ -100,7 +99,7 @@ class RobotPrograms(Problem[Program]):
 
 def noise_seed(seed: int, program: Program) -> int:
     """Return the seed of the noise a program is driven with: its own, and the same whenever the run meets it."""
-    return int.from_bytes(hashlib.blake2b(program.canonical, digest_size=8, key=seed.to_bytes(8)).digest())
+    return seed_of(program.canonical, seed)
 
 
 def segment_times(arrival_s: Floats) -> Floats:
