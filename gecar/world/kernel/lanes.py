@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from gecar.compiled import kernel, lane_access
 from gecar.world.kernel.conditions import Conditions
-from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, arrive, begin_program, tile_at
+from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, begin_program, enter_tile
 from gecar.world.kernel.interpreter import CONTROL, EYES, Floor, look, run_program
 from gecar.world.kernel.lock_step import (
     LANES,
@@ -115,7 +115,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901
         flat = m.flat
         waiting = 0
         for lane in range(LANES):
-            waiting = _take(lane, waiting, jobs, under, floor, m)
+            waiting = _take(lane, waiting, jobs, under, floor, late, m)
         due = True
         while True:
             if remembers:
@@ -127,7 +127,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901
                 for lane in range(LANES):
                     if m.job[lane] >= 0 and flat[_DUE + lane] != 0.0:
                         while m.job[lane] >= 0 and not _attend(lane, jobs, under, floor, m, ends):
-                            waiting = _take(lane, waiting, jobs, under, floor, m)
+                            waiting = _take(lane, waiting, jobs, under, floor, late, m)
                     going = going or m.job[lane] >= 0
                 if not going:
                     return
@@ -187,7 +187,7 @@ def drive_lanes(jobs: Jobs, under: Conditions, floor: Floor, memory: Memory, end
 
 
 @kernel
-def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory) -> int:
+def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, late: bool, m: Memory) -> int:
     """Put the next job into a lane, at rest at its start; return the number of the one after it."""
     if waiting >= jobs.program.shape[0]:
         m.job[lane] = -1
@@ -205,7 +205,8 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
     k.left_command = k.right_command = k.left_before = k.right_before = k.step = 0.0
     k.due = 1.0
     _store_carried(m.flat, LANES, lane, k)
-    m.commands[2 * RING * lane : 2 * RING * (lane + 1)] = 0.0
+    if late:
+        m.commands[2 * RING * lane : 2 * RING * (lane + 1)] = 0.0
     begin_program(m.control[lane], under.phase_ms[condition], under.derived[condition].dt, s, p, floor)
     e = m.eyes[lane]
     for sensor in range(3):
@@ -240,13 +241,8 @@ def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, e
     control = m.control[lane]
     n = int(k.step)
     control.step = n
-    x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
-    tile = tile_at(x, y, floor)
     limit = under.limit[jobs.condition[job]]
-    outcome = RUNNING
-    if tile != control.tile:
-        control.tile = tile
-        outcome, m.passed[lane] = arrive(tile, m.passed[lane], n * c.dt, floor, ends.arrival_s[job])
+    outcome, m.passed[lane] = enter_tile(n, s, p, c, control, floor, m.passed[lane], ends.arrival_s[job])
     if outcome == RUNNING and n >= limit:
         outcome = OUT_OF_TIME
     if outcome == RUNNING and (n >= control.due_step or control.until >= 0):
@@ -258,9 +254,10 @@ def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, e
         return False
     _change(m.flat, _LEFT + lane, min(max(control.left_duty, -p.duty_cap), p.duty_cap))
     _change(m.flat, _RIGHT + lane, min(max(control.right_duty, -p.duty_cap), p.duty_cap))
-    _change(m.flat, _COLUMN + lane, np.floor(x * floor.per_tile))
-    _change(m.flat, _ROW + lane, np.floor(y * floor.per_tile))
+    _change(m.flat, _COLUMN + lane, np.floor((s.x - p.com_ahead * s.cos) * floor.per_tile))
+    _change(m.flat, _ROW + lane, np.floor((s.y - p.com_ahead * s.sin) * floor.per_tile))
     wake = n + 1 if control.until >= 0 else min(control.due_step, limit)
+    # Any step up to the next one asks again then: a lane that polls has nothing to store.
     if wake > n + 1 or m.flat[_WAKE + lane] > n + 1:
         m.flat[_WAKE + lane] = wake
     return True
