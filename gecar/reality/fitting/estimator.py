@@ -17,6 +17,7 @@ from gecar.reality.optimisation.least_squares import (
     cost,
     cost_of_each,
     least_squares,
+    steps_inwards,
     weights,
 )
 from gecar.reality.residuals.of_case import Residuals
@@ -165,7 +166,7 @@ class Estimator:
             z, high = parameters.vector(model.values), parameters.bounds[1]
             of_effect = [k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect]
             probes = parameters.probes[of_effect]
-            steps.append(np.where(z[of_effect] + probes <= high[of_effect], probes, -probes))
+            steps.append(steps_inwards(z[of_effect], probes, high[of_effect]))
             vectors = np.tile(z, (len(of_effect), 1))
             vectors[range(len(of_effect)), of_effect] += steps[-1]
             moved.append(parameters.physics(vectors))

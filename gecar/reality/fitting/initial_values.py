@@ -66,16 +66,17 @@ def responses(
     are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much.
     """
     effect = BY_ID[effect_id]
-    bare = errors([{}])[0]
     if effect.scan == "shaft cycles":
-        yield from (-basis for _, _, basis in _ripples(robot, recordings, errors))
+        yield from (-basis for _, _, basis in _ripples(robot, recordings, errors, _unrippled(errors)))
         return
     values: Sequence[Values] = ()
     if effect.scan == "floor cells":
         values = [_patch(*cell, radius) for cell in _cells(recordings) for radius in PATCH_RADII_M]
     elif effect.starts or effect.scan:
         values = initial_values(effect_id, robot, recordings, errors)
-    yield from ((bare - each)[:, None] for each in residuals_of_each(errors, values))
+    if values:
+        bare = errors([{}])[0]
+        yield from ((bare - each)[:, None] for each in residuals_of_each(errors, values))
 
 
 def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
@@ -127,10 +128,10 @@ def _shaft_cycles(robot: Robot, recordings: Sequence[Recording], errors: Errors)
     Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
     either shaft do, and least squares gives both phases at once.
     """
-    bare = errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
+    bare = _unrippled(errors)
     w, least = np.sqrt(weights(bare)), cost(bare)
     tried = []
-    for cycles, size, basis in _ripples(robot, recordings, errors):
+    for cycles, size, basis in _ripples(robot, recordings, errors, bare):
         a, b, c, d = -np.linalg.lstsq(w[:, None] * basis, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
         phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
@@ -142,13 +143,17 @@ def _shaft_cycles(robot: Robot, recordings: Sequence[Recording], errors: Errors)
             yield found
 
 
+def _unrippled(errors: Errors) -> Array:
+    """Return the residuals of a ripple of no size, shape (n,)."""
+    return errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
+
+
 def _ripples(
-    robot: Robot, recordings: Sequence[Recording], errors: Errors
+    robot: Robot, recordings: Sequence[Recording], errors: Errors, bare: Array
 ) -> Iterator[tuple[int, float, Array]]:
     """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
     turned = max(_turned(r, robot) for r in recordings)
     size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
-    bare = errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
     pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
     scanned = [cycles for cycles in CYCLES if cycles * turned >= LEAST_CYCLES]
     for two in (scanned[first : first + 2] for first in range(0, len(scanned), 2)):

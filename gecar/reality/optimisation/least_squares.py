@@ -79,9 +79,14 @@ def cost_of_each(residual: Callable[[Any], Array], vectors: Any) -> Array:
     return np.array([cost(errors) for errors in residuals_of_each(residual, vectors)])
 
 
+def steps_inwards(z: Array, probes: Array, high: Array) -> Array:
+    """Return the steps of one-sided differences: forward, or backward where the upper bound is nearer than a step."""
+    return np.where(z + probes <= high, probes, -probes)
+
+
 def jacobian(residual: Residual, z: Array, errors: Array, probes: Array, high: Array) -> Array:
     """Return forward differences, backward where a bound is near, shape (n, k)."""
-    steps = np.where(z + probes <= high, probes, -probes)
+    steps = steps_inwards(z, probes, high)
     moved = np.tile(z, (len(z), 1))
     np.fill_diagonal(moved, z + steps)
     return np.ascontiguousarray(((residual(moved) - errors) / steps[:, None]).T)

@@ -49,7 +49,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """
     candidates = list[Step]()
     while explained.steps and held.recordings:
-        judged = [_judged(explained, held, step) for step in explained.steps]
+        with_all = _held_errors(explained, held, explained.taken)
+        judged = [_judged(explained, held, step, with_all) for step in explained.steps]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
         worst, share = min(judged, key=lambda pair: pair[1].margin)
         if share.margin > 0.0:
@@ -59,11 +60,12 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     return Confirmation(explained, tuple(candidates))
 
 
-def _judged(explained: Explanation, held: Residuals, step: Step) -> tuple[Step, Share]:
-    """Return a step with what it gains on recordings set aside, and the share of it they ask for."""
-    without, with_all = (
-        _held_errors(explained, held, model) for model in (_without(explained, step), explained.taken)
-    )
+def _judged(explained: Explanation, held: Residuals, step: Step, with_all: Array) -> tuple[Step, Share]:
+    """Return a step with what it gains on recordings set aside, and the share of it they ask for.
+
+    ``with_all`` are their residuals under all steps, shape (n,).
+    """
+    without = _held_errors(explained, held, _without(explained, step))
     share = share_asked_for(held.index, without, with_all)
     return replace(step, holdout_gain=cost(without) - cost(with_all)), share
 
