@@ -1,4 +1,4 @@
-"""Options that several commands share, and what of them was typed."""
+"""Options that several commands share, and which of them were given."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from gecar.errors import expected
 
-WORLD = "World"
+WORLD, RUN = "World", "Run"
 
 CourseOption = Annotated[
     str | None,
@@ -41,10 +41,17 @@ EngineOption = Annotated[
     typer.Option("--engine", metavar="auto|inline|pymunk", rich_help_panel=WORLD, show_default="auto",
                  help="What moves the body; auto: pymunk where the course has something to touch."),
 ]  # fmt: skip
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+                 show_default=False, rich_help_panel=RUN),
+]  # fmt: skip
+NoPicturesOption = Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.", rich_help_panel=RUN)]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="Show no progress.", rich_help_panel=RUN)]
 
 
 def given(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that were typed."""
+    """Return the options that were given."""
     return {name: value for name, value in options.items() if value is not None}
 
 

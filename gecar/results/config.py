@@ -33,7 +33,7 @@ class Config(BaseModel):
     course, grammar, robot
         Names, or files.
     seed
-        Where all randomness comes from.
+        Random seed.
     executor, workers, scheduler
         Where programs are simulated; the address is that of Dask's scheduler, empty for a cluster on this machine.
     time_limit_s, step_s, engine

@@ -30,7 +30,7 @@ from gecar.results.run import load_task
 from gecar.world.course.course import load_course
 from gecar.world.perturbation import under_drawn_conditions
 from gecar.world.robot import load_robot
-from gecar.world.rollout import World, simulate
+from gecar.world.rollout import Drive, World, simulate
 
 SHOWN = 20
 """Drives under drawn conditions that a picture shows."""
@@ -86,13 +86,18 @@ def draw_convergence(folder: Path, target: Path) -> Path:
 
 def draw_trajectory(folder: Path, target: Path) -> Path:
     """Draw the drive of a run's best program, as the run scored it."""
-    file, settings = find_program(folder)
-    world, program = build_world(settings), read_program(file)
-    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-    title = title_of(drive, world.course, share_of(read_result(folder)))
+    world, program, drive, title = _best_drive(folder)
     others = under_drawn_conditions(world, program.opcodes, SHOWN)
     detail = f"{detail_of(world, drive)} · thin: {SHOWN} drives under other conditions"
     return save(trajectory(world, program, drive, title=title, detail=detail, others=others), target)
+
+
+def _best_drive(folder: Path) -> tuple[World, Program, Drive, str]:
+    """Drive a run's best program as the run scored it; return where, what, the drive and a title for it."""
+    file, settings = find_program(folder)
+    world, program = build_world(settings), read_program(file)
+    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
+    return world, program, drive, title_of(drive, world.course, share_of(read_result(folder)))
 
 
 def draw_tree(folder: Path, target: Path) -> Path:
@@ -173,10 +178,7 @@ def write_drive_page(folder: Path, target: Path) -> Path:
     InputError
         If the folder is no run's, or its run found no program.
     """
-    file, settings = find_program(folder)
-    world, program = build_world(settings), read_program(file)
-    drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-    title = title_of(drive, world.course, share_of(read_result(folder)))
+    world, program, drive, title = _best_drive(folder)
     return write_classroom_page(world, program, drive, target, title, detail_of(world, drive))
 
 

@@ -8,18 +8,22 @@ from typing import Annotated, Any
 import typer
 
 from gecar.cli.options import (
+    RUN,
     CourseOption,
     EngineOption,
     MotorNoiseOption,
     NoiseOption,
+    NoPicturesOption,
+    QuietOption,
     RobotOption,
+    SchedulerOption,
     TimeLimitOption,
     given,
     settings,
 )
 from gecar.cli.output import JsonOption, Output
 
-SEARCH, RUN = "Search (default: the preset's)", "Run"
+SEARCH = "Search (default: the preset's)"
 
 
 def _search(name: str, words: str, default: str | bool = False, metavar: str | None = None) -> Any:
@@ -37,7 +41,7 @@ def evolve(
         str | None, _search("--preset", "Search settings: better, paper (Table 4) or random.", "better", "NAME")
     ] = None,
     population: Annotated[int | None, _search("--population", "Programs in a generation; paper: 200.")] = None,
-    generations: Annotated[int | None, _search("--generations", "How often they are bred anew; paper: 50.")] = None,
+    generations: Annotated[int | None, _search("--generations", "Generations after the first; paper: 50.")] = None,
     codons: Annotated[int | None, _search("--codons", "Codons in a genome, the gene length; paper: 1000.")] = None,
     elites: Annotated[int | None, _search("--elites", "Best ones that stay as they are; paper: 1.")] = None,
     tournament: Annotated[int | None, _search("--tournament", "Candidates of a selection; paper: 5.")] = None,
@@ -52,9 +56,9 @@ def evolve(
         _search("--set", "Any other search setting, as in config.toml: --set crossover=subtree.", metavar="NAME=VALUE"),
     ] = None,
     grammar: Annotated[
-        str | None, _search("--grammar", "What programs are made of.", "paper", "NAME|FILE")
+        str | None, _search("--grammar", "Grammar of the programs.", "paper", "NAME|FILE")
     ] = None,
-    wraps: Annotated[int | None, _search("--wraps", "How often reading a genome starts again.", "0")] = None,
+    wraps: Annotated[int | None, _search("--wraps", "Maximum genome wraps.", "0")] = None,
     course: CourseOption = None,
     robot: RobotOption = None,
     noise: NoiseOption = None,
@@ -71,7 +75,7 @@ def evolve(
     engine: EngineOption = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", help="Where all randomness comes from.", show_default="1", rich_help_panel=RUN),
+        typer.Option("--seed", help="Random seed.", show_default="1", rich_help_panel=RUN),
     ] = None,
     workers: Annotated[
         int | None,
@@ -83,11 +87,7 @@ def evolve(
         typer.Option("--executor", metavar="process|thread|serial|dask", help="Where programs are simulated.",
                      show_default="process", rich_help_panel=RUN),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
-                     show_default=False, rich_help_panel=RUN),
-    ] = None,
+    scheduler: SchedulerOption = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="A new folder for the results.",
@@ -96,8 +96,8 @@ def evolve(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the run in --out where it was stopped.", rich_help_panel=RUN)
     ] = False,
-    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.", rich_help_panel=RUN)] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.", rich_help_panel=RUN)] = False,
+    no_pictures: NoPicturesOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Evolve a program that brings the robot round a course.

@@ -34,9 +34,7 @@ GenomeArgument = Annotated[
         help="Codons 0..255 with commas or spaces between; digits alone are a codon each, as in the paper's 302122.",
     ),
 ]  # fmt: skip
-WrapsOption = Annotated[
-    int, typer.Option("--wraps", help="How often reading starts again at the first codon.")
-]
+WrapsOption = Annotated[int, typer.Option("--wraps", help="Maximum genome wraps.")]
 ConsumesOption = Annotated[
     bool,
     typer.Option("--single-choice-consumes", help="A nonterminal with one alternative reads a codon, too."),

@@ -8,18 +8,22 @@ from typing import Annotated
 import typer
 
 from gecar.cli.options import (
+    RUN,
     CourseOption,
     EngineOption,
     MotorNoiseOption,
     NoiseOption,
+    NoPicturesOption,
+    QuietOption,
     RobotOption,
+    SchedulerOption,
     TimeLimitOption,
     given,
     settings,
 )
 from gecar.cli.output import JsonOption, Output
 
-GRID, SEARCH, RUN = "Grid", "Search", "Run"
+GRID, SEARCH = "Grid", "Search"
 
 
 def table(
@@ -57,7 +61,7 @@ def table(
     ] = None,
     generations: Annotated[
         int | None,
-        typer.Option("--generations", help="How often they are bred anew.", show_default=False, rich_help_panel=SEARCH),
+        typer.Option("--generations", help="Generations after the first.", show_default=False, rich_help_panel=SEARCH),
     ] = None,
     setting: Annotated[
         list[str] | None,
@@ -66,7 +70,7 @@ def table(
     ] = None,
     grammar: Annotated[
         str | None,
-        typer.Option("--grammar", metavar="NAME|FILE", help="What programs are made of.", show_default="paper",
+        typer.Option("--grammar", metavar="NAME|FILE", help="Grammar of the programs.", show_default="paper",
                      rich_help_panel=SEARCH),
     ] = None,
     course: CourseOption = None,
@@ -84,11 +88,7 @@ def table(
         str, typer.Option("--executor", metavar="process|thread|serial|dask", help="Where runs are performed.",
                           rich_help_panel=RUN),
     ] = "process",
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
-                     show_default=False, rich_help_panel=RUN),
-    ] = None,
+    scheduler: SchedulerOption = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="A new folder for runs, tables and pictures.",
@@ -99,8 +99,8 @@ def table(
         typer.Option("--resume", help="Go on in --out: finished runs are kept, the grid may have grown.",
                      rich_help_panel=RUN),
     ] = False,
-    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.", rich_help_panel=RUN)] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.", rich_help_panel=RUN)] = False,
+    no_pictures: NoPicturesOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Run crossover x mutation x seeds, or any other grid: the paper's Table 5 and Fig. 5.
