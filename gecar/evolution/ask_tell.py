@@ -171,7 +171,7 @@ class Evolution(Generic[P]):
 
     @property
     def parents(self) -> npt.NDArray[np.int32]:
-        """Whom the individuals asked for, or told of last, come from; see `gecar.evolution.breeding.Bred`."""
+        """Parents of the generation asked for or told of last; see `gecar.evolution.breeding.Bred`."""
         return self._parents
 
     def ask(self) -> list[Candidate[P]]:
@@ -237,7 +237,7 @@ class Evolution(Generic[P]):
         return self.problem.rescored and self.problem.wants_more(self._cache.look_up([digest])[0])
 
     def _pooled(self, told: Scores) -> Scores:
-        """Add to what is known of programs what was told now."""
+        """Pool new scores with those already known of the same programs."""
         if self.problem.rescored:
             for k, digest in enumerate(self._asked):
                 if digest in self._cache:
@@ -256,9 +256,13 @@ class Evolution(Generic[P]):
         return self._breeder.next(self.genomes, self.scores, generation, known)
 
     def _grow(self, generation: int, known: Callable[[bytes], bool]) -> Bred[P]:
-        """Breed from the best so far by doubling subtrees; those of earlier populations are nobody's children."""
-        genomes = np.array([one.genome for one in self.contenders])
-        scores = np.concatenate([one.score for one in self.contenders])
+        """Breed from the contenders by duplicating subtrees.
+
+        The lineage knows parents in the generation before only: contenders of earlier ones count as none, -1.
+        """
+        contenders = self.contenders
+        genomes = np.array([one.genome for one in contenders])
+        scores = np.concatenate([one.score for one in contenders])
         bred = self._breeder.next(genomes, scores, generation, known, grown=True)
         before = {genome.tobytes(): i for i, genome in enumerate(self.genomes)}
         places = np.array([before.get(genome.tobytes(), -1) for genome in genomes], np.int32)

@@ -27,6 +27,12 @@ Operator = Callable[[Bytes, Mapper, Streams], Bytes]
 """Genomes (children, codons), what they derive, and a stream for each; the genomes may be changed in place."""
 
 
+GROWN = 0.7
+"""Probability that a child of a stagnant population has one of its subtrees duplicated."""
+LONGEST = 54
+"""Most codons of such a child: six conditions of Table 3, 24 lines. Without a limit winners had up to 18 conditions."""
+
+
 @dataclass(frozen=True)
 class Bred(Generic[P]):
     """Individuals that wait for their scores.
@@ -49,12 +55,6 @@ class Bred(Generic[P]):
     parents: Int32s
     changed: Bytes
 
-
-GROWN = 0.7
-"""Probability of a child of a stagnant population that one of its subtrees is doubled; numbers of all may creep."""
-
-LONGEST = 54
-"""Most codons of a program that grew: six conditions of Table 3, 24 lines. Without a limit some had eighteen."""
 
 Drawn = tuple[Bytes, Int32s, Bytes]
 """Genomes, parents and changes, as in `Bred`."""
@@ -118,7 +118,7 @@ class Breeder(Generic[P]):
         known
             Whether a program, by its digest, was scored before.
         grown
-            Whether children double a subtree instead of being crossed and mutated.
+            Whether children have a subtree duplicated instead of being crossed and mutated.
         """
         operators = self._growth if grown else self._operators
         n_elites = self.settings.elites

@@ -99,11 +99,12 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
 
 
 WITHOUT_SUCCESS = 4
-"""Of 40 populations on the paper's course 39 had their first success within 36 generations, the other one never."""
+"""How much longer a population without success may take to improve. Of 40 on the paper's course 39 had their first
+success within 36 generations, the other one never."""
 
 
 class Patience:
-    """Says when a population has come to its end: for so many generations it held nothing better.
+    """Tells when a population is stagnant: so many generations without a better program.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class Patience:
 
     @property
     def at_its_end(self) -> bool:
-        """Whether the next generation is to be a new population."""
+        """Whether the population is stagnant, and gives way to another."""
         limit = self._limit if self._best < UNSOLVED else WITHOUT_SUCCESS * self._limit
         return 0 < limit <= self._idle
 

@@ -159,10 +159,10 @@ def _creep(
 
 @dataclass(frozen=True)
 class Duplicate:
-    """A subtree comes to stand twice, one after the other, where the grammar has a production for that.
+    """Duplicates a subtree: a copy follows it, by a production that holds its nonterminal twice, as <code><code>.
 
-    A robot that does the same twice mostly drives as before, and what follows may change one copy and keep the other:
-    gene duplication (Ohno 1970; in GE O'Neill and Ryan, IEEE T-EC 5(4), 2001, who copy codons wherever they stand).
+    A robot that does the same twice mostly drives as before, and later one copy may change while the other stays: gene
+    duplication (Ohno 1970; in GE O'Neill and Ryan, IEEE T-EC 5(4), 2001, who copy codons wherever they stand).
 
     Attributes
     ----------

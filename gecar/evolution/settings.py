@@ -19,7 +19,7 @@ class EvolutionSettings(BaseModel):
     Attributes
     ----------
     population, generations
-        Individuals, and how often they are bred anew after the first population.
+        Individuals, and number of generations after the first population.
     codons
         Gene length: codons 0..255 of each genome.
     elites
@@ -52,15 +52,15 @@ class EvolutionSettings(BaseModel):
     creep_rate
         Probability of a used codon that chooses a number to step to a neighbouring one.
     creep_most
-        Numbers of a child that step, on average, at most.
+        Most numbers of a child that step, on average; inf: no limit.
     duplicates
         ``kept``; or bred again, up to `attempts` times, where the same program is already in the
         ``generation``, or was scored before in the ``run``.
     attempts
         How often a duplicate is bred again.
     restart_after
-        Generations without a better program, once one succeeds, after which the population gives way to another; the
-        best so far stays the run's result. 0: never.
+        Generations without a better program after which the population gives way to another; as long as none has
+        succeeded, four times as many. The best so far stays the run's result. 0: never.
     restart
         What it gives way to. ``random``: a first population. ``grown``: that once, so that two beginnings compete, and
         from then on the best programs so far with one of their subtrees doubled: they grow from what they can do.

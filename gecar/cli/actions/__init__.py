@@ -1,1 +1,1 @@
-"""What commands do, where that is much: load, call, save, tell."""
+"""The work of the larger commands, one module each: load, run, save and report."""

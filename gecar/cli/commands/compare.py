@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FRAMES = ("start", "course")
 SEED = 1
-"""Of the fresh conditions that a program's share of arrivals is measured under; as ``gecar simulate`` by default."""
+"""Seed of the drawn conditions that a program's share of arrivals is measured under, as in ``gecar simulate``."""
 
 
 def compare(
