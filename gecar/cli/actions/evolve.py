@@ -14,10 +14,12 @@ from gecar.cli.inputs import drive_seed
 from gecar.cli.output import Output
 from gecar.cli.progress import Watch
 from gecar.compiled import is_cold, mark_warm
+from gecar.evolution.scores import UNSOLVED
 from gecar.report.drive import arrival_of, sentence_of, standing_of
 from gecar.report.runs import effort_of
 from gecar.results.config import configure, merged, read_config
 from gecar.results.run import Started, finish, resume, start
+from gecar.search.chance import AS_GOOD
 from gecar.search.settings import DEFAULT_PRESET
 from gecar.world.rollout import simulate
 
@@ -111,6 +113,11 @@ def _tell(output: Output, started: Started, result: dict[str, Any], pictures: li
         drive = simulate(world, best.program.opcodes, seed)
         output.print(sentence_of(drive))
         output.print(arrival_of(result["arrives"]))
+        fastest = min(generation.best for generation in started.evolution.history)
+        if AS_GOOD * fastest < best.merit < UNSOLVED:
+            output.print(
+                f"What looked faster in the search ({fastest:.2f} s) was less reliable on fresh drives."
+            )
         output.print(standing_of(world, drive))
         same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
         output.print(f"With pymunk moving the body, the drive {same}.")
