@@ -94,8 +94,14 @@ def test_no_commands_carry_the_outer_wheel_farther_than_the_bound_allows(case):
     assert max(farthest(UNCAPPED.with_effects(effect_of(*case)), seed=1)) <= 0.0
 
 
-# Known: one of some hundred random draws (backwards at full duty for 0.3 s) passes the bound by 0.2 mm; still open.
-@settings(deadline=None, max_examples=60, derandomize=True)
+@pytest.mark.parametrize("dt", [0.0005, 0.002, 0.01])
+def test_a_regulator_that_saturates_starts_no_earlier_than_the_bound_allows(dt):
+    robot = REGULATED.with_effects({"coulomb_friction": {"torque_nm": 0.12}})
+    for seconds in (0.05, 0.3, 1.0):
+        assert max(beyond_the_bound(robot, [(-1.0, -1.0)], seconds, dt)) <= 0.0
+
+
+@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_nor_do_random_commands_with_several_effects(data):
     chosen = data.draw(st.lists(st.sampled_from(STRENGTHS), max_size=3))

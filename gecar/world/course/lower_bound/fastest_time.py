@@ -41,7 +41,7 @@ class Sprint(NamedTuple):
     time_constant
         Of the way there from rest [s].
     dead_s
-        What passes before the motors answer [s].
+        What passes before the motors answer [s]; negative where steps let them answer early.
     downhill
         What gravity gives a robot that slides [m/s^2]; 0 where the tyres hold.
     exchange
@@ -86,11 +86,14 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
     over = 2.0 * abs(rolling - turning) / (2.0 * inertia + rolling + turning)
     free = push > 0.0 or unlike > 0.0
     holding = _holding(p, tilt)
+    dead = 0.0 if free else max(p["actuation_delay"], p["start_latency"])
+    # A saturated regulator hides the half step that commands wait for velocities: the robot starts that much early.
+    early = 0.5 * _LONGEST_STEP_S if p["regulated"] else 0.0
     return Sprint(
         float(speed),
         math.inf if free else float(large * p["speed_limit"] * (1.0 + over)),
         float((inertia + min(rolling, turning)) / damping),
-        0.0 if free else float(max(p["actuation_delay"], p["start_latency"])),
+        float(dead - early),
         GRAVITY * tilt if holding <= 0.0 else 0.0,
         float(p["mass"] * behind * max(speed, 0.0) * uneven * large**2 / (2.0 * track**2 * damping)),
         float(speed**2 / (2.0 * holding)) if holding > 0.0 else math.inf,
