@@ -30,7 +30,7 @@ MARGIN = 1.05
 """How far behind the best so far, in time to GOAL, a program is let go after the first draws."""
 STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 """Steps a result is checked at [s]."""
-CHOICE_STEPS_S = (0.003, 0.0014, 0.0007, 0.00035)
+CHOICE_STEPS_S = (0.0036, 0.003, 0.0024, 0.0016, 0.0014, 0.0012, 0.0008, 0.0007, 0.0006, 0.0004, 0.0003)
 """Steps the programs that a result is chosen from are driven at [s]."""
 AS_GOOD = 1.01
 """How much slower a shorter program may be to be chosen before the best: lexicographic parsimony in buckets (Luke and
