@@ -64,7 +64,7 @@ def pool(score: np.void, share: float) -> None:
     times = np.concatenate([[score["fitness_s"]], drawn[~np.isnan(drawn)]])
     arrived = np.isfinite(times)
     enough = arrived.mean() >= share
-    score["merit"] = np.median(times[arrived]) if enough else UNSOLVED
+    score["merit"] = max(np.median(times[arrived]), score["fitness_s"]) if enough else UNSOLVED
     score["share"] = 1.0 if enough else 0.5 + 0.5 * arrived.sum() / max(len(drawn) / ROUNDS + 1, len(times))
 
 
@@ -181,14 +181,17 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
     at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
     unsteady = at_steps.max(axis=1) > STEADY * at_steps.min(axis=1)
     first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
-    order = np.lexsort(([merit_of(times, share) for times in first], unsteady))
+    order = np.lexsort(
+        (np.maximum([merit_of(times, share) for times in first], at_steps.max(axis=1)), unsteady)
+    )
     left = order[: max(1, (len(order) + 3) // 4)].tolist()
     second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1))
     both = [
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)
     ]
-    merits, last = np.array([merit_of(times, share) for times in both]), unsteady[left]
+    slowest = at_steps[left].max(axis=1)
+    merits, last = np.maximum([merit_of(times, share) for times in both], slowest), unsteady[left]
     best = np.lexsort((merits, last))[0]
     as_good = np.flatnonzero((merits <= AS_GOOD * merits[best]) & (last == last[best]))
     return int(left[min(as_good, key=lambda k: (len(programs[left[k]]), merits[k]))])

@@ -25,7 +25,7 @@ def drawn_conditions(world: World, count: int, seed: int | tuple[int, ...] = 0) 
     Spreads (standard deviations, or ranges): motors 2 % apart, dry friction 0.6 to 1.6 of the robot's, battery 4 %
     around its level, grip 2/3 to 1 of the robot's, white read as 85 to 100 % of itself and black as up to 8 % more,
     readings noisy by 1 %, start 5 mm and 2 degrees off, the program begins within 10 ms, a motor statement takes 0.4
-    to 1 ms beside its own time, steps of 2 to 4 ms.
+    to 1 ms beside its own time (in a quarter of the draws none, as in eq. 1), steps of 2 to 4 ms.
     Sources: step fits of five EV3 motors (gain 6.7 to 12 deg/s per percent, Coulomb friction 13 to 50 deg/s, here
     within one robot's life), 7.4 to 9 V over a charge with the mean recalibrated, white 50 to 98 and black 2 to 10 %
     before, and within this after, calibration. Phase, statement time and step are the simulation's own freedom: what a
@@ -69,7 +69,7 @@ def drawn_conditions(world: World, count: int, seed: int | tuple[int, ...] = 0) 
         10.0 * u[10],
         max(world.noise.sensor_pct, 1.0),
         world.noise.motor_share,
-        0.4 + 0.6 * u[11],
+        np.where(u[11] < 0.25, 0.0, 0.2 + 0.8 * u[11]),
     )
 
 
