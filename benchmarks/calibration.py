@@ -25,9 +25,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.concealed.commands import SECONDS, line_follower, script
+from benchmarks.concealed.history import ROW_TICKS, Array, replayed
 from benchmarks.concealed.recording import Conditions, channels, noise, write_recording
 from benchmarks.concealed.robot import SHAFT_INERTIA, SUPPLY, TRACK_WIDTH, WHEEL_RADIUS, Concealed
-from benchmarks.concealed.truth import ROW_TICKS, Array, Truth, replayed
+from benchmarks.concealed.truth import Truth
 from gecar.reality.calibrate.calibration import calibrate
 from gecar.reality.calibrate.constants import BY_NAME
 from gecar.reality.recordings.recording import read_case

@@ -22,6 +22,7 @@ from benchmarks.concealed.colour_sensor import line_share
 from benchmarks.concealed.comparators.methods import METHODS, changed
 from benchmarks.concealed.drive_train import DriveTrain
 from benchmarks.concealed.exam import Terms, agreed
+from benchmarks.concealed.history import replayed
 from benchmarks.concealed.judging import judge
 from benchmarks.concealed.plan import Counts, draw_all, plan
 from benchmarks.concealed.results import write_results
@@ -29,7 +30,7 @@ from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.runner import run_all
 from benchmarks.concealed.score import figures, score
 from benchmarks.concealed.tables import draw, report
-from benchmarks.concealed.truth import Truth, replayed
+from benchmarks.concealed.truth import Truth
 from gecar.parallel import run_parallel
 from gecar.parallel.executors import SerialExecutor
 from gecar.reality import discovery

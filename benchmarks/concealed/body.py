@@ -7,20 +7,11 @@ import math
 import mujoco
 
 from benchmarks.concealed.robot import (
-    BACK_EMF_CONSTANT,
-    CASTER_AHEAD,
     CASTER_RADIUS,
     CHASSIS_PITCH_INERTIA,
     CHASSIS_ROLL_INERTIA,
     GRAVITY,
-    MASS,
-    RESISTANCE,
-    SHAFT_INERTIA,
-    TORQUE_CONSTANT,
-    TRACK_WIDTH,
     WHEEL_MASS,
-    WHEEL_RADIUS,
-    YAW_INERTIA,
     Concealed,
 )
 
@@ -70,26 +61,26 @@ def build(concealed: Concealed) -> mujoco.MjModel:
 
 def radii(concealed: Concealed) -> tuple[float, float]:
     """Give the rolling radius of the left and the right wheel [m]."""
-    mean, half = WHEEL_RADIUS * concealed.radius_scale, concealed.radius_difference / 2.0
+    mean, half = concealed.base.wheel_radius * concealed.radius_scale, concealed.radius_difference / 2.0
     return mean * (1.0 - half), mean * (1.0 + half)
 
 
 def _chassis(concealed: Concealed) -> str:
     """Brick and battery, such that everything together has the nominal mass, centre of mass and yaw inertia."""
-    height = sum(radii(concealed)) / 2.0
-    half_track = TRACK_WIDTH * concealed.track_scale / 2.0
-    mass = MASS - 2.0 * WHEEL_MASS
-    ahead = MASS * concealed.com_ahead / mass
-    up = (MASS * concealed.com_height - 2.0 * WHEEL_MASS * height) / mass - height
+    base, height = concealed.base, sum(radii(concealed)) / 2.0
+    half_track = base.track_width * concealed.track_scale / 2.0
+    mass = base.mass - 2.0 * WHEEL_MASS
+    ahead = base.mass * concealed.com_ahead / mass
+    up = (base.mass * concealed.com_height - 2.0 * WHEEL_MASS * height) / mass - height
     wheels = 2.0 * WHEEL_MASS * (concealed.com_ahead**2 + half_track**2 + 0.3 * height**2)
-    yaw = YAW_INERTIA - wheels - mass * (ahead - concealed.com_ahead) ** 2
+    yaw = base.yaw_inertia - wheels - mass * (ahead - concealed.com_ahead) ** 2
     inertia = f"{CHASSIS_ROLL_INERTIA} {CHASSIS_PITCH_INERTIA} {yaw!r}"
     left, right = radii(concealed)
     return (
         f'<body name="chassis" pos="0 0 {height + _unevenness(concealed)!r}"><freejoint/>'
         f'<inertial pos="{ahead!r} 0 {up!r}" mass="{mass}" diaginertia="{inertia}"/>'
         f'<geom name="caster" type="sphere" size="{CASTER_RADIUS}" {_GHOST} '
-        f'pos="{CASTER_AHEAD} 0 {CASTER_RADIUS - height!r}"/>'
+        f'pos="{base.caster_ahead} 0 {CASTER_RADIUS - height!r}"/>'
         f"{_wheel(concealed, 'left', half_track, left)}{_wheel(concealed, 'right', -half_track, right)}</body>"
     )
 
@@ -113,10 +104,12 @@ def _wheel(concealed: Concealed, side: str, y: float, radius: float) -> str:
             f'<body name="{side}_wheel"><joint name="{side}_play" type="hinge" axis="0 1 0" limited="true" '
             f'range="{-play!r} {play!r}" {_HARD.format("limit")}/>{wheel}</body>'
         )
-    damping = TORQUE_CONSTANT * BACK_EMF_CONSTANT / RESISTANCE + concealed.viscous_friction
+    base = concealed.base
+    braking = base.torque_constant * base.back_emf_constant / base.resistance
+    damping = braking + concealed.viscous_friction
     return (
         f'<body name="{side}_shaft" pos="0 {y!r} 0"><joint name="{side}" type="hinge" axis="0 1 0" '
-        f'armature="{SHAFT_INERTIA * concealed.inertia_scale!r}" damping="{damping!r}" '
+        f'armature="{base.shaft_inertia * concealed.inertia_scale!r}" damping="{damping!r}" '
         f'frictionloss="{max(concealed.coulomb_friction, 1e-9)!r}" {_HARD.format("friction")}/>{wheel}</body>'
     )
 

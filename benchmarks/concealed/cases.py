@@ -25,16 +25,16 @@ from benchmarks.concealed.recording import (
     write_recording,
 )
 from benchmarks.concealed.robot import NEUTRAL, Concealed
-from benchmarks.concealed.truth import (
+from benchmarks.concealed.history import (
     ROW_TICKS,
     Array,
     Controller,
     History,
     Pose,
     ToppledError,
-    Truth,
     replayed,
 )
+from benchmarks.concealed.truth import Truth
 
 # Six recordings to learn from and two to be judged by, of kinds that the six do not hold.
 RUNS = ("holds", "holds", "holds_gentle", "sines", "line", "line", "reversals", "line_smooth")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from benchmarks.concealed.drive_train import TICK_S
+from benchmarks.concealed.history import TICK_S
 from benchmarks.concealed.robot import Concealed
 
 # The paper's course: 8 x 4 tiles of 0.30 m, a line 25 mm wide through the centres of the 20 rim tiles, sharp corners.
@@ -85,6 +85,15 @@ class ColourSensor:
         self._level = math.nan
         lag = concealed.sensor_lag
         self._follow = 1.0 - math.exp(-TICK_S / lag) if lag > 0.0 else 1.0
+        self._ticks = 0
+        self._before: tuple[float, float] | None = None  # where the mount was a tick ago [m]
+        self._swing = [
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]  # the loose mount: ahead, left [m] and their rates, in the robot's frame
+        self._moving = (0.0, 0.0)  # velocity of the mount in the course's frame [m/s]
 
     def look(self, x: float, y: float, heading: float) -> float:
         """Read the floor.
@@ -104,13 +113,24 @@ class ColourSensor:
             self._level, self._waiting = seen, deque([seen] * len(self._waiting))
         self._waiting.append(seen)
         self._level += self._follow * (self._waiting.popleft() - self._level)
-        return self._hidden.sensor_gain * self._level + self._hidden.sensor_offset_pct
+        light = self._level
+        if self._hidden.flicker is not None:
+            share, hertz, phase = self._hidden.flicker
+            light *= (
+                1.0 + share * (math.sin(2.0 * math.pi * hertz * self._ticks * TICK_S + phase) - 1.0) / 2.0
+            )
+        self._ticks += 1
+        return self._hidden.sensor_gain * light + self._hidden.sensor_offset_pct
 
     def _floor(self, x: float, y: float, heading: float) -> float:
         hidden = self._hidden
         cos, sin = math.cos(heading), math.sin(heading)
-        spot_x = x + cos * hidden.sensor_ahead - sin * hidden.sensor_left
-        spot_y = y + sin * hidden.sensor_ahead + cos * hidden.sensor_left
+        ahead, left = hidden.sensor_ahead, hidden.sensor_left
+        if hidden.sway is not None:
+            self._sway(x + cos * ahead, y + sin * ahead, heading)
+            ahead, left = ahead + self._swing[0], left + self._swing[1]
+        spot_x = x + cos * ahead - sin * left
+        spot_y = y + sin * ahead + cos * left
         dx, dy, angle = hidden.line_shift
         if (dx, dy, angle) != (0.0, 0.0, 0.0):
             cos, sin = math.cos(angle), math.sin(angle)
@@ -120,4 +140,28 @@ class ColourSensor:
         if hidden.ambient is not None:
             loss, source = hidden.ambient
             light *= 1.0 - loss * (1.0 - math.cos(heading - source)) / 2.0
+        if hidden.gamma != 1.0:
+            light = 100.0 * max(light / 100.0, 0.0) ** hidden.gamma
+        if hidden.gloss is not None:
+            share, length, phase_x, phase_y = hidden.gloss
+            turn = 2.0 * math.pi / length
+            shine = math.sin(turn * spot_x + phase_x) * math.sin(turn * spot_y + phase_y)
+            light *= 1.0 - share * (1.0 + shine) / 2.0
         return light
+
+    def _sway(self, x: float, y: float, heading: float) -> None:
+        """Let the loose mount swing: a damped spring that the robot's acceleration at (x, y) shakes."""
+        hertz, damping = self._hidden.sway or (1.0, 1.0)
+        old, self._before = self._before or (x, y), (x, y)
+        moving = ((x - old[0]) / TICK_S, (y - old[1]) / TICK_S)
+        jump_x, jump_y = moving[0] - self._moving[0], moving[1] - self._moving[1]
+        self._moving = moving
+        cos, sin = math.cos(heading), math.sin(heading)
+        jumps = (cos * jump_x + sin * jump_y, cos * jump_y - sin * jump_x)
+        pull = 2.0 * math.pi * hertz
+        for k, jump in enumerate(jumps):
+            self._swing[2 + k] -= jump
+            self._swing[2 + k] -= TICK_S * (
+                2.0 * damping * pull * self._swing[2 + k] + pull**2 * self._swing[k]
+            )
+            self._swing[k] += TICK_S * self._swing[2 + k]

@@ -8,20 +8,18 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.concealed.colour_sensor import FIELD
-from benchmarks.concealed.drive_train import TICK_S
-from benchmarks.concealed.robot import SUPPLY, TRACK_WIDTH, WHEEL_RADIUS
-from benchmarks.concealed.truth import ROW_TICKS, Array, Controller, Pose
+from benchmarks.concealed.history import ROW_TICKS, TICK_S, Array, Controller, Pose
+from benchmarks.concealed.robot import EV3, Base
 
 SECONDS = 12.0
 _ROW_S = ROW_TICKS * TICK_S
 _ROWS = round(SECONDS / _ROW_S) + 1
 _SHAFT_TIME_S = 0.105  # how fast a shaft follows its duty, for keeping scripts inside the field only
-_RAD_S_PER_PCT = SUPPLY / 0.4731 / 100.0
 
 Hold = tuple[float, float, float]  # seconds, left, right
 
 
-def script(kind: str, rng: np.random.Generator) -> tuple[Pose, Array]:
+def script(kind: str, rng: np.random.Generator, base: Base = EV3) -> tuple[Pose, Array]:
     """Draw an open-loop command sequence and where to start it.
 
     Parameters
@@ -30,6 +28,8 @@ def script(kind: str, rng: np.random.Generator) -> tuple[Pose, Array]:
         ``holds``, ``holds_gentle``, ``sines`` or ``reversals``.
     rng
         Source of randomness.
+    base
+        The robot.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def script(kind: str, rng: np.random.Generator) -> tuple[Pose, Array]:
     for _ in range(40):
         start = (rng.uniform(0.9, 1.5), rng.uniform(0.45, 0.75), rng.uniform(-math.pi, math.pi))
         commands = _SCRIPTS[kind](rng)
-        strayed = _strayed(start, commands)
+        strayed = _strayed(start, commands, base)
         if strayed < least:
             best, least = (start, commands), strayed
         if least == 0.0:
@@ -147,14 +147,14 @@ def _held(draw: Callable[[], Hold]) -> Array:
     return commands
 
 
-def _strayed(start: Pose, commands: Array) -> float:
+def _strayed(start: Pose, commands: Array, base: Base) -> float:
     """How far beyond the field's edge a planar first-order guess takes the axle [m]."""
     speeds, pose, worst = np.zeros(2), list(start), 0.0
     follow = _ROW_S / _SHAFT_TIME_S
     for row in commands:
-        speeds += follow * (_RAD_S_PER_PCT * row - speeds)
-        left, right = WHEEL_RADIUS * speeds
-        pose[2] += _ROW_S * (right - left) / TRACK_WIDTH
+        speeds += follow * (base.supply / base.back_emf_constant / 100.0 * row - speeds)
+        left, right = base.wheel_radius * speeds
+        pose[2] += _ROW_S * (right - left) / base.track_width
         pose[0] += _ROW_S * (left + right) / 2.0 * math.cos(pose[2])
         pose[1] += _ROW_S * (left + right) / 2.0 * math.sin(pose[2])
         worst = max(worst, -pose[0], -pose[1], pose[0] - FIELD[0], pose[1] - FIELD[1])

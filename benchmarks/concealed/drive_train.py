@@ -6,19 +6,12 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from benchmarks.concealed.robot import (
-    BACK_EMF_CONSTANT,
-    DUTY_CAP,
-    RESISTANCE,
-    SUPPLY,
-    TORQUE_CONSTANT,
-    Concealed,
-)
+from benchmarks.concealed.history import TICK_S
+from benchmarks.concealed.robot import DUTY_CAP, Concealed
 
-TICK_S = 0.001  # firmware, sensors and slow forces act at 1 kHz, the rigid bodies twice as fast
-
-_STALL_TORQUE_PER_VOLT = TORQUE_CONSTANT / RESISTANCE  # N m / V
 _LIMITER_GAIN = 20.0  # V s / rad: the speed limiter lets go of the whole supply within 0.4 rad/s
+_TOOTH_BLEND = 0.2  # rad/s: below this a damaged tooth lets go, so that it cannot drive the robot
+_BAND_SLIPS = 10.0  # rad: a rubber band round the axle slips rather than winding up for ever
 
 
 @dataclass(frozen=True)
@@ -40,7 +33,8 @@ class DriveTrain:
     """
 
     def __init__(self, concealed: Concealed) -> None:
-        self._hidden = concealed
+        self._hidden, self._base = concealed, concealed.base
+        self._stall_torque_per_volt = self._base.torque_constant / self._base.resistance  # N m / V
         waiting = round(concealed.actuation_delay / TICK_S)
         self._queue = deque([(0.0, 0.0)] * waiting)
         self._ramped = (0.0, 0.0)
@@ -75,6 +69,8 @@ class DriveTrain:
             )
             self._ramped = late
         left, right = self._shaped(late[0]), self._shaped(late[1])
+        if left != 0.0 and right != 0.0:
+            left, right = left * (1.0 - self._hidden.shared_drop), right * (1.0 - self._hidden.shared_drop)
         return left * self._gains[0], right * self._gains[1]
 
     def drive(
@@ -100,12 +96,18 @@ class DriveTrain:
         Drive
         """
         terminal = self._terminal(duties, speeds, time_s)
-        torques = tuple(self._torque(i, duties[i] * terminal, speeds[i], angles[i]) for i in (0, 1))
+        torques = tuple(
+            self._torque(i, duties[i] * terminal, speeds[i], angles[i])
+            + self._oddities(i, duties[i] * terminal, speeds[i], angles[i], time_s)
+            for i in (0, 1)
+        )
         friction = (self._friction(speeds[0]), self._friction(speeds[1]))
         return Drive(torques, friction, terminal)  # type: ignore[arg-type]
 
     def _shaped(self, duty_pct: float) -> float:
         """Cap and dead band: a dead zone takes the band off the duty, a threshold only blocks what is below it."""
+        if self._hidden.duty_step_pct > 0.0:
+            duty_pct = self._hidden.duty_step_pct * round(duty_pct / self._hidden.duty_step_pct)
         duty = min(max(duty_pct / 100.0, -DUTY_CAP), DUTY_CAP)
         band = self._hidden.dead_band_pct / 100.0
         if band == 0.0:
@@ -116,19 +118,23 @@ class DriveTrain:
 
     def _terminal(self, duties: tuple[float, float], speeds: tuple[float, float], time_s: float) -> float:
         """Voltage at the terminals: a chopper draws duty x motor current from a source behind a resistance."""
-        source = SUPPLY * self._hidden.supply_scale - self._hidden.battery_drain * time_s
+        source = self._base.supply * self._hidden.supply_scale - self._hidden.battery_drain * time_s
         inner = self._hidden.battery_resistance
         if inner == 0.0:
             return source
-        load = (duties[0] ** 2 + duties[1] ** 2) / RESISTANCE
-        back = BACK_EMF_CONSTANT * (duties[0] * speeds[0] + duties[1] * speeds[1]) / RESISTANCE
+        load = (duties[0] ** 2 + duties[1] ** 2) / self._base.resistance
+        back = (
+            self._base.back_emf_constant
+            * (duties[0] * speeds[0] + duties[1] * speeds[1])
+            / self._base.resistance
+        )
         return (source + inner * back) / (1.0 + inner * load)
 
     def _torque(self, side: int, volts: float, speed: float, angle: float) -> float:
         hidden = self._hidden
         if abs(speed) > hidden.speed_limit - 1.0:
             volts = self._limited(volts, speed)
-        torque = _STALL_TORQUE_PER_VOLT * volts
+        torque = self._stall_torque_per_volt * volts
         if hidden.direction_gain != 0.0 and volts != 0.0:
             torque *= 1.0 + hidden.direction_gain * math.copysign(1.0, volts)
         if hidden.friction_ratio != 0.0:
@@ -141,10 +147,33 @@ class DriveTrain:
             )
         return torque
 
+    def _oddities(self, side: int, volts: float, speed: float, angle: float, time_s: float) -> float:
+        """Torque of physics outside the catalogue [N m], on top of the nominal motor's (which brakes by back-EMF)."""
+        hidden, torque = self._hidden, 0.0
+        usual = self._stall_torque_per_volt * (volts - self._base.back_emf_constant * speed)
+        if hidden.heat is not None and hidden.heat[2] == side:
+            grown = hidden.heat[0] * (1.0 - math.exp(-time_s / hidden.heat[1]))
+            torque -= usual * grown / (1.0 + grown)
+        if hidden.coasting > 0.0 and volts == 0.0:
+            torque -= usual * hidden.coasting
+        most = hidden.current_limit * self._base.torque_constant
+        if abs(usual) > most:
+            torque -= math.copysign(abs(usual) - most, usual)
+        if hidden.tooth is not None and hidden.tooth[2] == side:
+            size, width, _, phase = hidden.tooth
+            if (angle + phase) % (2.0 * math.pi) < width:
+                torque -= size * math.tanh(speed / _TOOTH_BLEND)
+        if hidden.rubber_band is not None and hidden.rubber_band[1] == side:
+            torque -= hidden.rubber_band[0] * angle / (1.0 + abs(angle) / _BAND_SLIPS)
+        return torque
+
     def _limited(self, volts: float, speed: float) -> float:
         """Take voltage away so that the motor's own torque never drives it above the limit; it may coast there."""
         turn = math.copysign(1.0, speed)
-        holding = BACK_EMF_CONSTANT * abs(speed) + self._hidden.coulomb_friction / _STALL_TORQUE_PER_VOLT
+        holding = (
+            self._base.back_emf_constant * abs(speed)
+            + self._hidden.coulomb_friction / self._stall_torque_per_volt
+        )
         allowed = holding + _LIMITER_GAIN * (self._hidden.speed_limit - abs(speed))
         return turn * min(turn * volts, max(allowed, 0.0))
 

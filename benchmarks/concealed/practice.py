@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.concealed.history import ROW_TICKS, Array, History, Pose, replayed
 from benchmarks.concealed.robot import Concealed
-from benchmarks.concealed.truth import ROW_TICKS, Array, History, Pose, Truth, replayed
+from benchmarks.concealed.truth import Truth
 
 # The twelve practice cases' answers.toml, in this world's terms. p10 gives no phases, so only its size is known.
 ANSWERS = {

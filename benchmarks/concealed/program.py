@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.concealed.colour_sensor import FIELD, TILE
+from benchmarks.concealed.history import ROW_TICKS, Array, Controller, History, Pose
 from benchmarks.concealed.recording import Conditions, channels, even_ticks, noise, write_recording
 from benchmarks.concealed.robot import Concealed
-from benchmarks.concealed.truth import ROW_TICKS, Array, Controller, History, Pose, Truth
+from benchmarks.concealed.truth import Truth
 
 # Opcode rows: operation, a, b, c, target, line.
 MOTOR, MOTOR_UNTIL, TEST, JUMP = range(4)

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 
 from benchmarks.concealed.colour_sensor import FIELD
-from benchmarks.concealed.robot import Concealed
-from benchmarks.concealed.truth import ROW_TICKS, Array, History
+from benchmarks.concealed.history import ROW_TICKS, TICK_S, Array, History
+from benchmarks.concealed.robot import EV3, NEUTRAL, Base, Concealed
 
 Ticks = npt.NDArray[np.intp]
 
@@ -30,6 +30,48 @@ POSE = ("x_m", "y_m", "heading_deg")
 ANGLES = ("left_angle_deg", "right_angle_deg")
 CHANNELS = (*ANGLES, *NOISE)
 _FORMATS = {"x_m": ".4f", "y_m": ".4f", "heading_deg": ".2f", "battery_v": ".3f", "yaw_rate_dps": ".1f"}
+
+
+ROBOT_FILE = "robot.toml"
+ROBOT = """name = "{base.name}"
+
+[body]
+mass = {base.mass}
+yaw_inertia = {base.yaw_inertia}
+com_ahead = {nominal.com_ahead}
+com_height = {nominal.com_height}
+track_width = {base.track_width}
+wheel_radius = {base.wheel_radius}
+caster_ahead = {base.caster_ahead}
+length = 0.180
+width = 0.150
+
+[motor]
+torque_constant = {base.torque_constant}
+back_emf_constant = {base.back_emf_constant}
+resistance = {base.resistance}
+inertia = {base.shaft_inertia}
+coulomb_friction = {nominal.coulomb_friction}
+backlash = 0.0
+
+[battery]
+voltage = {base.supply}
+resistance = 0.0
+
+[drive]
+duty_cap = 0.80
+mode = "duty"
+
+[tyre]
+friction = {nominal.tyre_friction}
+
+[colour_sensor]
+ahead = {nominal.sensor_ahead}
+left = {nominal.sensor_left}
+spot_diameter = {nominal.spot_diameter}
+white = 100.0
+black = 0.0
+"""
 
 
 @dataclass(frozen=True)
@@ -50,6 +92,14 @@ class Conditions:
         Poses per second.
     camera_offsets_s
         Camera clock minus brick clock, per recording [s]: the camera is started by hand.
+    log_hz
+        Rows, and turns of the controller, per second.
+    encoder_step_deg
+        What the encoders resolve [deg].
+    jitter_s
+        Largest error of a row's time stamp [s].
+    dropped_share
+        Share of rows that never reached the file.
     """
 
     columns: tuple[str, ...] = CHANNELS
@@ -58,15 +108,24 @@ class Conditions:
     coloured_time_s: float = 0.1
     camera_hz: float = 30.0
     camera_offsets_s: tuple[float, ...] = ()
+    log_hz: float = 100.0
+    encoder_step_deg: int = 1
+    jitter_s: float = 0.0
+    dropped_share: float = 0.0
+
+    @property
+    def row_ticks(self) -> int:
+        """Ticks from row to row."""
+        return round(1.0 / (self.log_hz * TICK_S))
 
     def camera_offset_s(self, run: int) -> float:
         """Give the camera's clock offset in one recording [s]."""
         return self.camera_offsets_s[run] if self.camera_offsets_s else 0.0
 
 
-def even_ticks(history: History) -> Ticks:
-    """Give the ticks at which a row is written: every 10 ms."""
-    return np.arange(0, len(history.time_s), ROW_TICKS)
+def even_ticks(history: History, row_ticks: int = ROW_TICKS) -> Ticks:
+    """Give the ticks at which a row is written: every 10 ms, if not said otherwise."""
+    return np.arange(0, len(history.time_s), row_ticks)
 
 
 def channels(
@@ -92,6 +151,9 @@ def channels(
     """
     rows = even_ticks(history) if ticks is None else ticks
     angles = np.degrees(history.angles[rows])
+    if concealed.encoder_wave_deg is not None:
+        wave, *phases = concealed.encoder_wave_deg
+        angles = angles + wave * (np.sin(history.angles[rows] + phases) - np.sin(phases))
     x, y, heading = _seen_pose(history, concealed, rows, concealed.pose_delay + camera_offset_s)
     columns = (
         angles[:, 0],
@@ -101,12 +163,14 @@ def channels(
         y,
         np.degrees(heading),
         history.terminal_v[rows],
-        np.degrees(history.yaw_rate[rows]),
+        concealed.gyro_scale * np.degrees(history.yaw_rate[rows]) + concealed.gyro_bias_dps,
     )
     return dict(zip(CHANNELS, columns, strict=True))
 
 
-def noise(name: str, rows: int, conditions: Conditions, rng: np.random.Generator) -> Array:
+def noise(
+    name: str, rows: int, conditions: Conditions, rng: np.random.Generator, apart_s: float = 0.01
+) -> Array:
     """Draw one channel's noise.
 
     Parameters
@@ -114,11 +178,13 @@ def noise(name: str, rows: int, conditions: Conditions, rng: np.random.Generator
     name
         A key of ``NOISE``.
     rows
-        How many samples, 10 ms apart.
+        How many samples.
     conditions
         Level and colour.
     rng
         Source of randomness.
+    apart_s
+        Time from sample to sample [s].
 
     Returns
     -------
@@ -127,7 +193,7 @@ def noise(name: str, rows: int, conditions: Conditions, rng: np.random.Generator
     """
     size = NOISE[name] * conditions.noise_level
     white, driven = rng.normal(size=rows), rng.normal(size=rows)
-    share, keep = conditions.coloured_share, math.exp(-0.01 / conditions.coloured_time_s)
+    share, keep = conditions.coloured_share, math.exp(-apart_s / conditions.coloured_time_s)
     driven[1:] *= math.sqrt(1.0 - keep**2)
     lingering = lfilter([1.0], [1.0, -keep], driven)
     total: Array = size * (math.sqrt(1.0 - share) * white + math.sqrt(share) * lingering)
@@ -147,8 +213,9 @@ def write_recording(
     conditions: Conditions,
     rng: np.random.Generator,
     ticks: Ticks | None = None,
+    base: Base = EV3,
 ) -> None:
-    """Write the CSV file and the TOML file beside it.
+    """Write the CSV file and the TOML file beside it, and for a robot other than the EV3 its file.
 
     Parameters
     ----------
@@ -164,8 +231,10 @@ def write_recording(
         Source of randomness.
     ticks
         The same as for ``clean``.
+    base
+        The robot as its file has it.
     """
-    ticks = even_ticks(history) if ticks is None else ticks
+    ticks = even_ticks(history, conditions.row_ticks) if ticks is None else ticks
     times, commands, readings = history.time_s[ticks], history.commands[ticks], history.readings[ticks]
     rows = len(times)
     frames = camera_rows(times, conditions.camera_hz)
@@ -174,20 +243,37 @@ def write_recording(
         texts[name] = [str(round(value)) for value in commands[:, side]]
     for name in CHANNELS:
         if name in ANGLES:
-            values = [str(round(value)) for value in clean[name] + rng.uniform(-0.5, 0.5)]
+            step = conditions.encoder_step_deg
+            values = [str(step * round(value)) for value in clean[name] / step + rng.uniform(-0.5, 0.5)]
         elif name == "reflection_pct":
             values = [str(round(value)) for value in readings]
         else:
-            noisy = clean[name] + noise(name, rows, conditions, rng)
+            noisy = clean[name] + noise(name, rows, conditions, rng, 1.0 / conditions.log_hz)
             values = [format(value, _FORMATS[name]) for value in noisy]
         if name in POSE:
             values = [value if frame else "" for value, frame in zip(values, frames, strict=True)]
         if name in conditions.columns:
             texts[name] = values
-    lines = [",".join(texts), *map(",".join, zip(*texts.values(), strict=True))]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
-    beside = 'robot = "ev3"\ncourse = "paper"\nrig = "floor"\n'
+    if conditions.jitter_s > 0.0:
+        late = rng.uniform(0.0, conditions.jitter_s, rows)
+        texts["t_s"] = [f"{time:.4f}" for time in times + late - late[0]]
+    lines = list(map(",".join, zip(*texts.values(), strict=True)))
+    if conditions.dropped_share > 0.0:
+        kept = rng.random(rows) >= conditions.dropped_share
+        kept[0] = True  # the recording begins with the robot at rest
+        lines = [line for line, keep in zip(lines, kept, strict=True) if keep]
+    path.write_text("\n".join([",".join(texts), *lines]) + "\n", encoding="utf-8", newline="\n")
+    if base != EV3:
+        write_robot(path.parent, base)
+    robot = EV3.name if base == EV3 else ROBOT_FILE
+    beside = f'robot = "{robot}"\ncourse = "paper"\nrig = "floor"\n'
     path.with_suffix(".toml").write_text(beside, encoding="utf-8", newline="\n")
+
+
+def write_robot(folder: Path, base: Base) -> None:
+    """Write the robot file that recordings of a robot other than the EV3 name."""
+    text = ROBOT.format(nominal=NEUTRAL, base=base)
+    (folder / ROBOT_FILE).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _seen_pose(
@@ -198,7 +284,12 @@ def _seen_pose(
     pose = np.stack([np.interp(times - late_s, history.time_s, column) for column in history.pose.T])
     away = pose[:2] - np.array(FIELD)[:, None] / 2.0
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))
-    turn = math.radians(concealed.pose_drift_deg) * times
+    turn = math.radians(concealed.pose_drift_deg) * times + math.radians(concealed.camera_turn_deg)
+    if concealed.camera_bump is not None:
+        since, shift_x, shift_y, bumped = concealed.camera_bump
+        after = times >= since
+        away = away + np.outer([shift_x, shift_y], after)
+        turn = turn + bumped * after
     x = FIELD[0] / 2.0 + np.cos(turn) * away[0] - np.sin(turn) * away[1]
     y = FIELD[1] / 2.0 + np.sin(turn) * away[0] + np.cos(turn) * away[1]
     return x, y, pose[2] + turn

@@ -27,12 +27,43 @@ CHASSIS_PITCH_INERTIA = 0.0030  # kg m^2
 
 
 @dataclass(frozen=True)
+class Base:
+    """The numbers of a robot that its file states and no effect changes, in SI units; default: the EV3."""
+
+    name: str = "ev3"
+    mass: float = MASS
+    yaw_inertia: float = YAW_INERTIA
+    caster_ahead: float = CASTER_AHEAD
+    track_width: float = TRACK_WIDTH
+    wheel_radius: float = WHEEL_RADIUS
+    torque_constant: float = TORQUE_CONSTANT
+    back_emf_constant: float = BACK_EMF_CONSTANT
+    resistance: float = RESISTANCE
+    shaft_inertia: float = SHAFT_INERTIA
+    supply: float = SUPPLY
+
+
+EV3 = Base()
+# The 81.6 mm wheel (LEGO 2903) on a wide frame; motors and battery are the EV3's.
+LARGE = Base("large", mass=0.90, yaw_inertia=0.0060, track_width=0.160, wheel_radius=0.0408)
+# SPIKE's large angular motor runs free at 175 rpm and stalls at 0.25 N m with 7.2 V (LEGO's fact sheet 45602).
+SPIKE = Base(
+    "spike", mass=0.55, yaw_inertia=0.0026, track_width=0.112, torque_constant=0.235, back_emf_constant=0.385,
+    resistance=6.5, shaft_inertia=0.0012, supply=7.6,
+)  # fmt: skip
+BASES = {base.name: base for base in (EV3, LARGE, SPIKE)}
+
+
+@dataclass(frozen=True)
 class Concealed:
     """What one robot hides. Every default is neutral: the nominal robot hides nothing.
 
     Catalogue effects come first, then physics that no row of the catalogue describes. SI units, except where a
-    name ends in ``_pct`` or ``_deg``. Lengths and angles of the floor are in the course's frame.
+    name ends in ``_pct`` or ``_deg``. Lengths and angles of the floor are in the course's frame. ``base`` is no
+    secret: the recordings' robot file states it.
     """
+
+    base: Base = EV3
 
     coulomb_friction: float = 0.0165  # N m
     viscous_friction: float = 0.0  # N m s / rad
@@ -94,6 +125,35 @@ class Concealed:
     ambient: tuple[float, float] | None = None  # share of light lost, heading it comes from [rad]
     pose_drift_deg: float = 0.0  # deg / s of heading in the pose, and of the path with it
     dropouts: tuple[tuple[float, float], ...] = ()  # start, length [s]: no command reaches the motors
+
+    # Outside the catalogue, from the second set of kinds. Sides: 0 left, 1 right.
+    heat: tuple[float, float, int] | None = None  # share the resistance grows by, time constant [s], side
+    loosening: tuple[float, int] | None = None  # play that grows between motor and wheel [rad/s], side
+    duty_step_pct: float = 0.0  # the firmware rounds duties to multiples of this
+    shared_drop: float = 0.0  # share of the voltage lost while both motors are driven
+    current_limit: float = math.inf  # A, of each motor's driver
+    tooth: tuple[float, float, int, float] | None = None  # torque [N m], width [rad], side, phase [rad]
+    rubber_band: tuple[float, int] | None = None  # torque per angle wound up [N m/rad], side
+    coasting: float = 0.0  # share of the braking that is missing at duty 0
+    dust: tuple[float, float] | None = None  # share of grip lost at last, way it takes [m]
+    hop: tuple[float, float, int] | None = None  # share of grip lost half of each turn, from [rad/s], side
+    pile: tuple[float, float] | None = None  # drag against the pile [N], heading it points to [rad]
+    yaw_pull: float = 0.0  # N m on the chassis, counter-clockwise
+    swivel: tuple[float, float] | None = None  # sideways force of a castor wheel [N], trail [m]
+    camera_bump: tuple[float, float, float, float] | None = None  # time [s], shift x, y [m], turn [rad]
+    flicker: tuple[float, float, float] | None = None  # share, Hz, phase [rad]
+    sway: tuple[float, float] | None = None  # Hz and damping ratio of the sensor's mount
+
+    # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
+    inductance_scale: float = 1.0
+    presliding_scale: float = 1.0  # of the gear's deflection before it slides
+    creep_scale: float = 1.0  # of the tyres' slip per force
+    encoder_wave_deg: tuple[float, float, float] | None = None  # once a turn: amplitude, phases [rad]
+    camera_turn_deg: float = 0.0  # the camera's frame against the course's
+    gyro_scale: float = 1.0
+    gyro_bias_dps: float = 0.0
+    gamma: float = 1.0  # light reads 100 x (share of white) ** gamma
+    gloss: tuple[float, float, float, float] | None = None  # share, wave length [m], phases x, y [rad]
 
 
 NEUTRAL = Concealed()

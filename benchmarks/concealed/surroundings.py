@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.body import radii
+from benchmarks.concealed.history import TICK_S
 from benchmarks.concealed.robot import GRAVITY, Concealed
 
+_DRAG_BLEND = 0.02  # m/s: below this drags fade out, so that they cannot drive the robot
 _ROLLING_BLEND = 0.2  # rad/s: below this rolling resistance fades out, so that it cannot drive the robot
 
 
@@ -33,9 +35,14 @@ class Surroundings:
         self._wheels = [int(model.geom_bodyid[geom]) for geom in self._geoms]
         self._radii = radii(concealed)
         self._scratch = np.zeros(6)
-        self._pushed = bool(concealed.tether or concealed.magnet or concealed.gusts or concealed.air_drag)
-        self.idle = not (self._pushed or concealed.patch or concealed.waves or concealed.rolling_resistance)
-        self._inside = False
+        drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
+        self._pushed = bool(concealed.tether or concealed.magnet or concealed.gusts or drags)
+        self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
+        self.idle = not (self._pushed or self._gripped or concealed.waves or concealed.rolling_resistance)
+        self._rolled, self._castor = 0.0, math.nan  # way of the wheels [m], heading of a castor wheel [rad]
+        shafts = [model.joint(side) for side in ("left", "right")]
+        self._angle_at = [int(shaft.qposadr[0]) for shaft in shafts]
+        self._speed_at = [int(shaft.dofadr[0]) for shaft in shafts]
 
     def settle(self) -> None:
         """Set what does not change while driving, and undo what the last drive left behind."""
@@ -53,14 +60,18 @@ class Surroundings:
             Time since the recording began [s].
         """
         x, y = float(state.qpos[0]), float(state.qpos[1])
-        if self._hidden.patch is not None:
-            self._grip(x, y)
+        if self._gripped:
+            self._grip(x, y, state)
         if self._hidden.waves is not None:
             slope, length, phase_x, phase_y = self._hidden.waves
             turn = 2.0 * math.pi / length
             self._lean(slope * math.sin(turn * x + phase_x), slope * math.sin(turn * y + phase_y))
         if self._pushed:
-            state.xfrc_applied[self._chassis, :2] = self._push(x, y, state.qvel, time_s)
+            w, i, j, k = state.qpos[3:7]
+            heading = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
+            force_x, force_y = self._push(x, y, state.qvel, time_s)
+            drag_x, drag_y, turning = self._drag(heading, state.qvel)
+            state.xfrc_applied[self._chassis] = [force_x + drag_x, force_y + drag_y, 0.0, 0.0, 0.0, turning]
         if self._hidden.rolling_resistance > 0.0:
             self._resist(state)
 
@@ -73,13 +84,52 @@ class Surroundings:
             GRAVITY * down,
         ]
 
-    def _grip(self, x: float, y: float) -> None:
-        """Both tyres lose grip while the axle's centre is inside the disc."""
-        centre_x, centre_y, radius, coefficient = self._hidden.patch or (0.0, 0.0, 0.0, 0.0)
-        inside = math.hypot(x - centre_x, y - centre_y) < radius
-        if inside != self._inside:
-            self._inside = inside
-            self._model.pair_friction[self._tyres, :2] = coefficient if inside else self._hidden.tyre_friction
+    def _grip(self, x: float, y: float, state: mujoco.MjData) -> None:
+        """Set each tyre's friction: a disc on the floor, dust on the tread, a wheel that hops."""
+        hidden, grip = self._hidden, self._hidden.tyre_friction
+        if hidden.patch is not None:
+            centre_x, centre_y, radius, coefficient = hidden.patch
+            grip = coefficient if math.hypot(x - centre_x, y - centre_y) < radius else grip
+        speeds = state.qvel[self._speed_at]
+        if hidden.dust is not None:
+            lost, way = hidden.dust
+            self._rolled += TICK_S * self._radii[0] * float(np.abs(speeds).sum()) / 2.0
+            grip *= 1.0 - lost * (1.0 - math.exp(-self._rolled / way))
+        grips = [grip, grip]
+        if hidden.hop is not None:
+            lost, fast, side = hidden.hop
+            if abs(speeds[side]) > fast and math.sin(state.qpos[self._angle_at[side]]) > 0.0:
+                grips[side] *= 1.0 - lost
+        for tyre, own in zip(self._tyres, grips, strict=True):
+            self._model.pair_friction[tyre, :2] = own
+
+    def _drag(self, heading: float, velocity: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+        """Force [N] and torque [N m] on the chassis that depend on where it is heading."""
+        hidden, force_x, force_y = self._hidden, 0.0, 0.0
+        turning, rate = hidden.yaw_pull, float(velocity[5])
+        if hidden.pile is not None:
+            most, way = hidden.pile
+            ahead = math.cos(heading) * velocity[0] + math.sin(heading) * velocity[1]
+            against = (1.0 - math.cos(heading - way) * math.copysign(1.0, ahead)) / 2.0
+            drag = -most * against * math.tanh(ahead / _DRAG_BLEND)
+            force_x, force_y = drag * math.cos(heading), drag * math.sin(heading)
+        if hidden.swivel is not None:
+            most, trail = hidden.swivel
+            back = self._hidden.base.caster_ahead
+            vx = velocity[0] - back * math.sin(heading) * rate
+            vy = velocity[1] + back * math.cos(heading) * rate
+            if math.isnan(self._castor):
+                self._castor = heading
+            across = -math.sin(self._castor) * vx + math.cos(self._castor) * vy
+            self._castor += TICK_S * across / trail
+            side = -most * math.tanh(across / _DRAG_BLEND)
+            force_x, force_y = (
+                force_x - side * math.sin(self._castor),
+                force_y + side * math.cos(self._castor),
+            )
+            arm = back - hidden.com_ahead  # the forces act at the centre of mass, the castor's behind it
+            turning += arm * side * math.cos(self._castor - heading)
+        return force_x, force_y, turning
 
     def _push(
         self, x: float, y: float, velocity: npt.NDArray[np.float64], time_s: float

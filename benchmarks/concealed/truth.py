@@ -4,55 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.concealed.body import build
 from benchmarks.concealed.colour_sensor import ColourSensor
-from benchmarks.concealed.drive_train import TICK_S, DriveTrain
+from benchmarks.concealed.drive_train import DriveTrain
+from benchmarks.concealed.history import ROW_TICKS, TICK_S, Array, Controller, History, Pose, ToppledError
 from benchmarks.concealed.robot import GRAVITY, Concealed
 from benchmarks.concealed.surroundings import Surroundings
 
-Array = npt.NDArray[np.float64]
-Pose = tuple[float, float, float]
-Controller = Callable[[float, int], "tuple[int, int] | None"]
-
-ROW_TICKS = 10  # a row of the recording, and a turn of the controller, every 10 ms
 _STEPS_PER_TICK = 2
 _SETTLE_STEPS = 800  # 0.4 s on level ground, until tyres and caster carry their loads
 _UPRIGHT = math.cos(math.radians(20.0))
 
 mujoco.set_mju_user_warning(lambda _: None)  # or it writes a log file into whatever folder this runs in
-
-
-class ToppledError(ValueError):
-    """The robot fell over: no recording of a drive."""
-
-
-@dataclass(frozen=True)
-class History:
-    """One run at 1 kHz: times [s], what was commanded, and what was.
-
-    ``commands`` (n, 2) [%]; ``angles`` (n, 2), motor side [rad]; ``pose`` (n, 3) of the axle's centre [m, m, rad],
-    heading unwrapped; ``light`` (n,) [%] before noise; ``readings`` (n,) integers [%]; ``terminal_v`` (n,);
-    ``yaw_rate`` (n,) [rad/s].
-    """
-
-    time_s: Array
-    commands: Array
-    angles: Array
-    pose: Array
-    light: Array
-    readings: Array
-    terminal_v: Array
-    yaw_rate: Array
-
-    def until(self, count: int) -> History:
-        """Cut off everything from tick ``count`` on."""
-        return History(**{name: array[:count] for name, array in vars(self).items()})
 
 
 class Truth:
@@ -110,7 +77,7 @@ class Truth:
         """
         count = round(seconds / TICK_S) + 1
         noise = np.zeros(count) if reading_noise is None else reading_noise
-        log = _blank(count)
+        log = History.blank(count)
         state, train = self._placed(start), DriveTrain(self.concealed)
         around, sensor = Surroundings(self.concealed, self._model), ColourSensor(self.concealed)
         around.settle()
@@ -175,30 +142,7 @@ class Truth:
         return drive.terminal_v
 
 
-def _blank(count: int) -> History:
-    one, two, three = np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
-    time_s: Array = np.arange(count, dtype=np.float64) * TICK_S
-    return History(time_s, two, two.copy(), three, one, one.copy(), one.copy(), one.copy())
-
-
 def _finished(log: History) -> History:
     log.pose[:, 2] = np.unwrap(log.pose[:, 2])
     log.angles[:] -= log.angles[0]
     return log
-
-
-def replayed(commands: Array) -> Controller:
-    """Make a controller that gives recorded commands again, one row after the other, whatever the sensor says.
-
-    Parameters
-    ----------
-    commands
-        Left and right duty per row (n, 2) [%].
-
-    Returns
-    -------
-    Controller
-    """
-    rows = [(int(left), int(right)) for left, right in commands]
-    last = len(rows) - 1
-    return lambda time_s, _: rows[min(round(time_s / (TICK_S * ROW_TICKS)), last)]

@@ -1,0 +1,145 @@
+"""Battery, motors and gears in continuous time: inductance, LuGre friction, and a gear that twists."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.continuous.numbers import Numbers
+
+# State: currents [A], shaft speeds [rad/s], shaft angles [rad], bristle deflections [rad], left and right; then the
+# voltage of the battery's slow branch [V] and the voltage at its terminals [V].
+CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, SIZE = 0, 2, 4, 6, 8, 9, 10
+
+# Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
+GEAR_STIFFNESS = 40.0  # N m / rad
+GEAR_DAMPING = 0.03  # N m s / rad
+_TOOTH_ROUNDING = 0.0003  # rad: flanks meet gradually
+# LuGre (Canudas de Wit, Olsson, Astrom and Lischinsky 1995): bristle damping 0.3 of critical, fading with speed as
+# Olsson (1996) proposed, so that it never acts while sliding.
+_BRISTLE_DAMPING = 0.3
+_BRISTLE_FADES = 0.5  # rad / s
+# A battery's polarisation: part of its resistance acts behind a time constant of seconds (Chen and Rincon-Mora 2006).
+_SLOW_SHARE = 0.1
+_SLOW_TIME = 1.0  # s
+_LIMITER = 20.0  # V s / rad
+_BAND_SLIPS = 10.0  # rad
+_DRAG_BLEND = 0.2  # rad / s
+
+
+@numba.njit(cache=True)
+def step_drive(
+    n: Numbers,
+    d: npt.NDArray[np.float64],
+    duties: npt.NDArray[np.float64],
+    wheel_angles: npt.NDArray[np.float64],
+    wheel_speeds: npt.NDArray[np.float64],
+    time_s: float,
+    dt: float,
+    torques: npt.NDArray[np.float64],
+) -> None:
+    """Advance battery, motors and shafts by one step, and give the torques that reach the wheels.
+
+    Parameters
+    ----------
+    n
+        The robot.
+    d
+        State, changed in place.
+    duties
+        Signed shares of the terminal voltage (2,).
+    wheel_angles, wheel_speeds
+        Of the wheels, behind the gears (2,) [rad, rad/s].
+    time_s
+        Time since the recording began, by the log's clock [s].
+    dt
+        Step [s].
+    torques
+        Receives the gears' torques on the wheels (2,) [N m].
+    """
+    drawn = duties[0] * d[CURRENT] + duties[1] * d[CURRENT + 1]
+    source = n.supply - n.drain * time_s
+    terminal = source - (1.0 - _SLOW_SHARE) * n.inner_resistance * drawn - d[SLOW]
+    d[SLOW] += dt / _SLOW_TIME * (_SLOW_SHARE * n.inner_resistance * drawn - d[SLOW])
+    d[TERMINAL] = terminal
+    for side in range(2):
+        speed, angle = d[SPEED + side], d[ANGLE + side]
+        torque = _motor(n, d, side, duties[side], terminal, time_s, dt)
+        torque += _cogs(n, side, speed, angle)
+        torque -= _friction(n, d, side, speed, dt) + n.viscous * speed
+        play = n.play + (n.loosening_left if side == 0 else n.loosening_right) * time_s
+        gear = _gear(play / 2.0, angle - wheel_angles[side], speed - wheel_speeds[side])
+        d[SPEED + side] += dt * (torque - gear) / n.shaft_inertia
+        d[ANGLE + side] += dt * d[SPEED + side]
+        torques[side] = gear
+
+
+@numba.njit(cache=True)
+def _motor(
+    n: Numbers,
+    d: npt.NDArray[np.float64],
+    side: int,
+    duty: float,
+    terminal: float,
+    time_s: float,
+    dt: float,
+) -> float:
+    """Advance one motor's current, implicitly, and give its torque [N m]."""
+    speed, volts = d[SPEED + side], duty * terminal
+    volts *= 1.0 + n.direction_gain * np.sign(volts)
+    if abs(speed) > n.speed_limit - 1.0:
+        turn = np.sign(speed)
+        holding = n.back_emf * abs(speed) + n.coulomb * n.resistance / n.torque_constant
+        volts = turn * min(turn * volts, max(holding + _LIMITER * (n.speed_limit - abs(speed)), 0.0))
+    resistance = n.resistance
+    if n.heat > 0.0 and n.heat_side == side:
+        resistance *= 1.0 + n.heat * (1.0 - math.exp(-time_s / n.heat_time))
+    follow = dt / n.inductance
+    current = (d[CURRENT + side] + follow * (volts - n.back_emf * speed)) / (1.0 + follow * resistance)
+    current = min(max(current, -n.current_limit), n.current_limit)
+    d[CURRENT + side] = current
+    if duty == 0.0:
+        current *= 1.0 - n.coasting
+    return n.torque_constant * current
+
+
+@numba.njit(cache=True)
+def _cogs(n: Numbers, side: int, speed: float, angle: float) -> float:
+    """Give the torque that depends on the shaft's angle [N m]: cogging, a damaged tooth, a rubber band."""
+    phase = n.ripple_left if side == 0 else n.ripple_right
+    torque = n.ripple * math.sin(n.ripple_cycles * angle + phase)
+    if n.tooth > 0.0 and n.tooth_side == side and (angle + n.tooth_phase) % (2.0 * math.pi) < n.tooth_width:
+        torque -= n.tooth * math.tanh(speed / _DRAG_BLEND)
+    if n.band_side == side:
+        torque -= n.band * angle / (1.0 + abs(angle) / _BAND_SLIPS)
+    return torque
+
+
+@numba.njit(cache=True)
+def _friction(n: Numbers, d: npt.NDArray[np.float64], side: int, speed: float, dt: float) -> float:
+    """Advance the bristles of one gear train, exactly for a steady speed; give the friction [N m]."""
+    level = n.coulomb * (1.0 + n.friction_ratio * np.sign(speed))
+    level = max(level + n.static * math.exp(-((speed / n.stribeck) ** 2)), 1e-6)
+    stiffness = max(n.coulomb + n.static, 1e-6) / n.presliding
+    before = d[BRISTLE + side]
+    if speed != 0.0:
+        final = level / stiffness * np.sign(speed)
+        d[BRISTLE + side] = final + (before - final) * math.exp(-dt * stiffness * abs(speed) / level)
+    rate = (d[BRISTLE + side] - before) / dt
+    damping = 2.0 * _BRISTLE_DAMPING * math.sqrt(stiffness * n.shaft_inertia)
+    return stiffness * d[BRISTLE + side] + damping * rate * math.exp(-((speed / _BRISTLE_FADES) ** 2))
+
+
+@numba.njit(cache=True)
+def _gear(half: float, twist: float, rate: float) -> float:
+    """Give the torque of a twisted gear with play [N m]; its dead zone has round corners."""
+    if half <= 0.0:
+        return GEAR_STIFFNESS * twist + GEAR_DAMPING * rate
+    over = math.hypot(twist - half, _TOOTH_ROUNDING)
+    under = math.hypot(twist + half, _TOOTH_ROUNDING)
+    beyond = twist + (over - under) / 2.0
+    touching = 1.0 + ((twist - half) / over - (twist + half) / under) / 2.0
+    return GEAR_STIFFNESS * beyond + GEAR_DAMPING * rate * touching

@@ -1,0 +1,70 @@
+"""From the commands a program issues to the share of the battery's voltage across each motor."""
+
+from __future__ import annotations
+
+import math
+
+from benchmarks.concealed.history import TICK_S
+from benchmarks.concealed.robot import DUTY_CAP, Concealed
+
+
+class Firmware:
+    """Delay, ramp, rounding, cap and dead band, in this order, once a tick.
+
+    Parameters
+    ----------
+    concealed
+        What differs from the nominal robot.
+    """
+
+    def __init__(self, concealed: Concealed) -> None:
+        self._hidden = concealed
+        self._issued: list[tuple[float, float]] = []
+        self._late = round(concealed.actuation_delay / TICK_S)
+        self._now = [0.0, 0.0]
+        self._known: dict[tuple[float, float], tuple[float, float]] = {}
+
+    def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
+        """Pass on one tick's command.
+
+        Parameters
+        ----------
+        command_pct
+            Left and right duty [%].
+        time_s
+            Time since the recording began [s].
+
+        Returns
+        -------
+        tuple[float, float]
+            Signed share of the terminal voltage, left and right.
+        """
+        hidden = self._hidden
+        lost = hidden.dropouts and any(0.0 <= time_s - start < length for start, length in hidden.dropouts)
+        self._issued.append((0.0, 0.0) if lost else command_pct)
+        acting = self._issued[-1 - self._late] if self._late < len(self._issued) else (0.0, 0.0)
+        most = hidden.command_slew * TICK_S
+        if most < math.inf:
+            for side, wanted in enumerate(acting):
+                step = wanted - self._now[side]
+                self._now[side] = wanted if abs(step) <= most else self._now[side] + math.copysign(most, step)
+            acting = (self._now[0], self._now[1])
+        if acting not in self._known:
+            self._known[acting] = self._bridged(*acting)
+        return self._known[acting]
+
+    def _bridged(self, left_pct: float, right_pct: float) -> tuple[float, float]:
+        """Give both motors' shares of the voltage."""
+        left, right = self._bridge(left_pct), self._bridge(right_pct)
+        keep = 1.0 - self._hidden.shared_drop if left != 0.0 and right != 0.0 else 1.0
+        differ = self._hidden.gain_difference / 2.0
+        return left * keep * (1.0 - differ), right * keep * (1.0 + differ)
+
+    def _bridge(self, duty_pct: float) -> float:
+        """Round, cap, and lose what lies within the dead band."""
+        hidden = self._hidden
+        if hidden.duty_step_pct > 0.0:
+            duty_pct = round(duty_pct / hidden.duty_step_pct) * hidden.duty_step_pct
+        size, band = min(abs(duty_pct) / 100.0, DUTY_CAP), hidden.dead_band_pct / 100.0
+        lost = 0.0 if hidden.dead_band_is_threshold else band
+        return math.copysign(size - lost, duty_pct) if size > band or band == 0.0 else 0.0

@@ -1,0 +1,226 @@
+"""One concealed robot as plain numbers, the form compiled code takes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.robot import Concealed
+
+# A few millihenry are usual for brushed motors of this size; with 5.5 ohm the current follows within 0.9 ms.
+INDUCTANCE = 0.0049  # H
+# Gears begin to slide after a small fraction of a degree (Armstrong-Helouvry, Control of Machines with Friction, 1991).
+PRESLIDING = 0.001  # rad
+
+
+class Numbers(NamedTuple):
+    """SI units; left before right; whatever is not concealed is 0, or infinite where it is a limit."""
+
+    mass: float
+    yaw_inertia: float
+    com_ahead: float
+    com_height: float
+    caster: float
+    half_track: float
+    radius_left: float
+    radius_right: float
+    torque_constant: float
+    back_emf: float
+    resistance: float
+    inductance: float
+    shaft_inertia: float
+    supply: float
+    drain: float
+    inner_resistance: float
+    coulomb: float
+    viscous: float
+    static: float
+    stribeck: float
+    friction_ratio: float
+    presliding: float
+    direction_gain: float
+    play: float
+    loosening_left: float
+    loosening_right: float
+    ripple: float
+    ripple_cycles: float
+    ripple_left: float
+    ripple_right: float
+    speed_limit: float
+    heat: float
+    heat_time: float
+    heat_side: float
+    coasting: float
+    current_limit: float
+    tooth: float
+    tooth_width: float
+    tooth_side: float
+    tooth_phase: float
+    band: float
+    band_side: float
+    grip: float
+    patch_x: float
+    patch_y: float
+    patch_radius: float
+    patch_grip: float
+    dust: float
+    dust_way: float
+    hop: float
+    hop_speed: float
+    hop_side: float
+    creep: float
+    caster_friction: float
+    rolling: float
+    tilt_x: float
+    tilt_y: float
+    wave: float
+    wave_length: float
+    wave_x: float
+    wave_y: float
+    off_centre: float
+    off_left: float
+    off_right: float
+    oval: float
+    oval_left: float
+    oval_right: float
+    ridge: float
+    ridge_x: float
+    ridge_angle: float
+    tether: float
+    tether_x: float
+    tether_y: float
+    magnet: float
+    magnet_x: float
+    magnet_y: float
+    magnet_core: float
+    air_drag: float
+    pile: float
+    pile_way: float
+    yaw_pull: float
+    swivel: float
+    swivel_trail: float
+
+
+def numbers(concealed: Concealed) -> Numbers:
+    """Flatten a robot.
+
+    Parameters
+    ----------
+    concealed
+        What differs from the nominal robot.
+
+    Returns
+    -------
+    Numbers
+    """
+    base, half = concealed.base, concealed.radius_difference / 2.0
+    radius = base.wheel_radius * concealed.radius_scale
+    patch = concealed.patch or (0.0, 0.0, 0.0, 0.0)
+    waves = concealed.waves or (0.0, 1.0, 0.0, 0.0)
+    off_centre, oval = concealed.off_centre or (0.0, 0.0, 0.0), concealed.oval or (0.0, 0.0, 0.0)
+    ridge, tether = concealed.bump or (0.0, 0.0, 0.0), concealed.tether or (0.0, 0.0, 0.0)
+    magnet = concealed.magnet or (0.0, 0.0, 1.0, 0.0)
+    heat, tooth = concealed.heat or (0.0, 1.0, 0), concealed.tooth or (0.0, 0.0, 0, 0.0)
+    band, dust, hop = (
+        concealed.rubber_band or (0.0, 0),
+        concealed.dust or (0.0, 1.0),
+        concealed.hop or (0.0, 0.0, 0),
+    )
+    loosening = [0.0, 0.0]
+    if concealed.loosening is not None:
+        loosening[concealed.loosening[1]] = concealed.loosening[0]
+    pile, swivel = concealed.pile or (0.0, 0.0), concealed.swivel or (0.0, 1.0)
+    fields = {
+        "mass": base.mass,
+        "yaw_inertia": base.yaw_inertia,
+        "com_ahead": concealed.com_ahead,
+        "com_height": concealed.com_height,
+        "caster": base.caster_ahead,
+        "half_track": base.track_width * concealed.track_scale / 2.0,
+        "radius_left": radius * (1.0 - half),
+        "radius_right": radius * (1.0 + half),
+        "torque_constant": base.torque_constant,
+        "back_emf": base.back_emf_constant,
+        "resistance": base.resistance,
+        "inductance": INDUCTANCE * concealed.inductance_scale,
+        "shaft_inertia": base.shaft_inertia * concealed.inertia_scale,
+        "supply": base.supply * concealed.supply_scale,
+        "drain": concealed.battery_drain,
+        "inner_resistance": concealed.battery_resistance,
+        "coulomb": concealed.coulomb_friction,
+        "viscous": concealed.viscous_friction,
+        "static": concealed.static_friction,
+        "stribeck": concealed.stribeck_speed,
+        "friction_ratio": concealed.friction_ratio,
+        "presliding": PRESLIDING * concealed.presliding_scale,
+        "direction_gain": concealed.direction_gain,
+        "play": math.radians(concealed.backlash_deg),
+        "loosening_left": loosening[0],
+        "loosening_right": loosening[1],
+        "ripple": concealed.ripple_torque,
+        "ripple_cycles": concealed.ripple_cycles,
+        "ripple_left": concealed.ripple_phases[0],
+        "ripple_right": concealed.ripple_phases[1],
+        "speed_limit": concealed.speed_limit,
+        "heat": heat[0],
+        "heat_time": heat[1],
+        "heat_side": heat[2],
+        "coasting": concealed.coasting,
+        "current_limit": concealed.current_limit,
+        "tooth": tooth[0],
+        "tooth_width": tooth[1],
+        "tooth_side": tooth[2],
+        "tooth_phase": tooth[3],
+        "band": band[0],
+        "band_side": band[1],
+        "grip": concealed.tyre_friction,
+        "patch_x": patch[0],
+        "patch_y": patch[1],
+        "patch_radius": patch[2],
+        "patch_grip": patch[3],
+        "dust": dust[0],
+        "dust_way": dust[1],
+        "hop": hop[0],
+        "hop_speed": hop[1],
+        "hop_side": hop[2],
+        "creep": concealed.creep_scale,
+        "caster_friction": concealed.caster_friction,
+        "rolling": concealed.rolling_resistance,
+        "tilt_x": concealed.tilt[0],
+        "tilt_y": concealed.tilt[1],
+        "wave": waves[0],
+        "wave_length": waves[1],
+        "wave_x": waves[2],
+        "wave_y": waves[3],
+        "off_centre": off_centre[0],
+        "off_left": off_centre[1],
+        "off_right": off_centre[2],
+        "oval": oval[0],
+        "oval_left": oval[1],
+        "oval_right": oval[2],
+        "ridge": ridge[0],
+        "ridge_x": ridge[1],
+        "ridge_angle": ridge[2],
+        "tether": tether[2],
+        "tether_x": tether[0],
+        "tether_y": tether[1],
+        "magnet": magnet[3],
+        "magnet_x": magnet[0],
+        "magnet_y": magnet[1],
+        "magnet_core": magnet[2],
+        "air_drag": concealed.air_drag,
+        "pile": pile[0],
+        "pile_way": pile[1],
+        "yaw_pull": concealed.yaw_pull,
+        "swivel": swivel[0],
+        "swivel_trail": swivel[1],
+    }
+    return Numbers(**{name: float(number) for name, number in fields.items()})
+
+
+def gusts(concealed: Concealed) -> npt.NDArray[np.float64]:
+    """Give the gusts as rows of start, length [s] and force x, y [N]."""
+    return np.array(concealed.gusts, dtype=np.float64).reshape(-1, 4)
