@@ -12,10 +12,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.concealed.runner import DISCOVER, run_all
+from benchmarks.concealed.worlds import WORLDS
 
 if TYPE_CHECKING:
     from benchmarks.concealed.plan import Counts
 
+# By kind of case: how many things it conceals, and how many of them are outside the catalogue.
+_SIZES = {
+    "none": (0, 0),
+    "single": (1, 0),
+    "double": (2, 0),
+    "triple": (3, 0),
+    "mixed": (2, 1),
+    "outside": (1, 1),
+}
 STOPPED = "stopped; the same command goes on from here"
 
 
@@ -50,14 +60,18 @@ def _parser() -> argparse.ArgumentParser:
 
     draw = commands.add_parser("draw", help="draw and seal one case")
     draw.add_argument("--seed", type=int, required=True)
-    draw.add_argument("--kind", choices=("none", "single", "double", "outside"), required=True)
-    draw.add_argument("--effect", action="append", default=[], help="identifier; twice for --kind double")
+    draw.add_argument("--kind", choices=_SIZES, required=True)
+    draw.add_argument(
+        "--effect", action="append", default=[], help="identifier; as often as --kind has things"
+    )
     draw.add_argument("--name", default="case", help="of the case's folder")
+    draw.add_argument("--world", choices=WORLDS, default="mujoco")
     draw.set_defaults(command=_draw)
 
     plan = commands.add_parser("plan", help="draw and seal a whole examination; resumes")
     plan.add_argument("--seed", type=int, required=True)
     _ask_counts(plan)
+    plan.add_argument("--last", action="store_true", help="also the kinds kept for the last examination")
     plan.set_defaults(command=_plan)
 
     exam = commands.add_parser("exam", help="all of it: draw, seal, run, score, write the tables; resumes")
@@ -85,6 +99,21 @@ def _parser() -> argparse.ArgumentParser:
     score.add_argument("--title", default="Concealed cases")
     score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
     score.set_defaults(command=_score)
+
+    for command in (draw, plan, exam):
+        command.add_argument(
+            "--background",
+            choices=("on", "off"),
+            default="on",
+            help="off: nothing small in every robot, and strengths and robots as in the first examinations",
+        )
+    for command in (plan, exam):
+        command.add_argument(
+            "--world",
+            action="append",
+            metavar="NAME[:KIND=N,...]",
+            help=f"of {', '.join(WORLDS)}; repeat for several, each with counts of its own (mujoco)",
+        )
 
     for command in (exam, run):
         command.add_argument(
@@ -122,6 +151,8 @@ def _ask_counts(parser: argparse.ArgumentParser) -> None:
         "single": "conceal one effect (5 of each)",
         "double": "conceal two effects (40)",
         "outside": "conceal what no effect of the catalogue is (3 of each kind)",
+        "triple": "conceal three effects (0)",
+        "mixed": "conceal one effect and one thing that none is (0)",
     }
     for kind, what in words.items():
         parser.add_argument(f"--{kind}", type=int, metavar="N", help=f"cases that {what}")
@@ -131,19 +162,39 @@ def _ask_counts(parser: argparse.ArgumentParser) -> None:
 
 
 def _draw(chosen: argparse.Namespace) -> int:
-    from benchmarks.concealed.cases import draw_case, seal  # noqa: PLC0415
+    from benchmarks.concealed.cases import Manner, draw_case, seal  # noqa: PLC0415
 
     _known(chosen.kind, chosen.effect)
-    draw_case(chosen.name, chosen.kind, tuple(chosen.effect), (chosen.seed,), chosen.out)
+    manner = Manner(chosen.world, chosen.background == "on")
+    draw_case(chosen.name, chosen.kind, tuple(chosen.effect), (chosen.seed,), chosen.out, manner)
     print(seal(chosen.out))
     return 0
 
 
 def _plan(chosen: argparse.Namespace) -> int:
-    from benchmarks.concealed.plan import Counts, draw_all, plan  # noqa: PLC0415
+    from benchmarks.concealed.plan import draw_all, plan  # noqa: PLC0415
 
-    print(draw_all(plan(chosen.seed, _counts(chosen, Counts())), chosen.out, chosen.workers))
+    cases = plan(chosen.seed, _by_world(chosen), background=chosen.background == "on", last=chosen.last)
+    print(draw_all(cases, chosen.out, chosen.workers))
     return 0
+
+
+def _by_world(chosen: argparse.Namespace) -> dict[str, Counts]:
+    """Read how many cases of each kind each world has."""
+    from benchmarks.concealed.plan import Counts  # noqa: PLC0415
+
+    counts: dict[str, Counts] = {}
+    for asked in chosen.world or ["mujoco"]:
+        world, _, own = asked.partition(":")
+        pairs = [pair.partition("=") for pair in own.split(",") if pair]
+        kinds = [kind for kind, _, number in pairs if number.isdigit()]
+        if world not in WORLDS or len(kinds) < len(pairs) or set(kinds) - set(asdict(Counts())):
+            message = (
+                f"--world: found {asked}, expected one of {', '.join(WORLDS)}, and, if wanted, :KIND=N,KIND=N"
+            )
+            raise ValueError(message)
+        counts[world] = replace(_counts(chosen, Counts()), **{kind: int(number) for kind, _, number in pairs})
+    return counts
 
 
 def _counts(chosen: argparse.Namespace, whole: Counts) -> Counts:
@@ -246,15 +297,17 @@ def _practice(chosen: argparse.Namespace) -> int:
 
 def _known(kind: str, effects: list[str]) -> None:
     """Refuse what cannot be drawn, in one line."""
+    from benchmarks.concealed.cases import ALL_OUTSIDE  # noqa: PLC0415
     from benchmarks.concealed.effects import EFFECTS  # noqa: PLC0415
-    from benchmarks.concealed.outside import OUTSIDE  # noqa: PLC0415
 
-    choices = list(OUTSIDE if kind == "outside" else EFFECTS)
-    count = {"none": 0, "single": 1, "double": 2, "outside": 1}[kind]
-    unknown = [effect for effect in effects if effect not in choices]
-    if len(set(effects)) != count or len(effects) != count or unknown:
+    outside = [effect for effect in effects if effect in ALL_OUTSIDE]
+    unknown = [effect for effect in effects if effect not in {**EFFECTS, **ALL_OUTSIDE}]
+    count, foreign = _SIZES[kind]
+    if unknown or len(set(effects)) != len(effects) or (len(effects), len(outside)) != (count, foreign):
+        choices = {**(EFFECTS if count > foreign else {}), **(ALL_OUTSIDE if foreign else {})}
         found = ", ".join(effects) or "none"
-        message = f"--effect: found {found}, expected {count} different of: {', '.join(choices)}"
+        words = f"{count} different" + (", one of them outside the catalogue," if kind == "mixed" else "")
+        message = f"--effect: found {found}, expected {words} of: {', '.join(choices)}"
         raise ValueError(message)
 
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.colour_sensor import ColourSensor
+from benchmarks.concealed.background import Background, draw_background
 from benchmarks.concealed.commands import SECONDS, line_follower, script
-from benchmarks.concealed.effects import EFFECTS, Rng
+from benchmarks.concealed.detectability import visibility
+from benchmarks.concealed.effects import EFFECTS, Exactly, Rng
+from benchmarks.concealed.history import ROW_TICKS, Array, Controller, Pose, ToppledError, replayed
 from benchmarks.concealed.outside import OUTSIDE
 from benchmarks.concealed.recording import (
     ANGLES,
@@ -21,43 +24,83 @@ from benchmarks.concealed.recording import (
     POSE,
     Conditions,
     channels,
+    even_ticks,
     noise,
     write_recording,
 )
-from benchmarks.concealed.robot import NEUTRAL, Concealed
-from benchmarks.concealed.history import (
-    ROW_TICKS,
-    Array,
-    Controller,
-    History,
-    Pose,
-    ToppledError,
-    replayed,
-)
-from benchmarks.concealed.truth import Truth
+from benchmarks.concealed.rehearsal import Act, Rehearsal, along, stacked, tuned
+from benchmarks.concealed.robot import NEUTRAL, Base, Concealed
+from benchmarks.concealed.sealed_kinds import SEALED
+from benchmarks.concealed.settings import RUNS, Setting, draw_setting
+from benchmarks.concealed.sizes import is_material, size
+from benchmarks.concealed.worlds import truth
 
-# Six recordings to learn from and two to be judged by, of kinds that the six do not hold.
-RUNS = ("holds", "holds", "holds_gentle", "sines", "line", "line", "reversals", "line_smooth")
-HOLDOUT = (6, 7)
-KINDS = ("none", "single", "double", "outside")
+KINDS = ("none", "single", "double", "triple", "mixed", "outside")
+ALL_OUTSIDE = {**OUTSIDE, **SEALED}
+_HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
+_QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
+_REHEARSED = (0, 2, 3, 4)  # of eight recordings: enough to learn how loud something is
+_BACKGROUND_MM = (1.0, 6.0)  # how far a background moves the robot within a recording, and
+_BACKGROUND_DEG = 1.5  # turns it at most
+
+
+@dataclass(frozen=True)
+class Manner:
+    """Where and how cases are drawn.
+
+    Parameters
+    ----------
+    world
+        One of ``WORLDS``.
+    background
+        Whether every robot has a little of many things, strengths are drawn by how visible they are, and robots and
+        recordings vary. Without it cases are those of the first examinations.
+    """
+
+    world: str = "mujoco"
+    background: bool = False
 
 
 @dataclass(frozen=True)
 class Hidden:
     """What a case conceals.
 
-    ``robots``: one per recording. ``without``: for every effect, the robot with only the others, by the effect's id;
-    what is left when nothing is concealed is the nominal robot. ``label``: for the sealed file.
+    ``robots``: one per recording. ``off``: the robot with nothing concealed; it has the background. ``without``: for
+    every one of several things, the robots with only the others, by id. ``plain``: the robot of the file, where there
+    is a background. ``label``: for the sealed file.
     """
 
     robots: tuple[Concealed, ...]
-    without: dict[str, Concealed]
-    needs: tuple[str, ...]
+    off: Concealed
+    without: Mapping[str, tuple[Concealed, ...]]
     label: dict[str, Any]
+    plain: Concealed | None = None
 
 
-def draw_case(name: str, kind: str, effects: tuple[str, ...], seed: tuple[int, ...], out: Path) -> None:
+@dataclass(frozen=True)
+class Case:
+    """How one case is recorded."""
+
+    manner: Manner
+    setting: Setting
+    conditions: Conditions
+    seeds: Sequence[np.random.SeedSequence]
+
+    @property
+    def base(self) -> Base:
+        """The robot's file."""
+        return self.setting.base
+
+
+def draw_case(
+    name: str,
+    kind: str,
+    effects: tuple[str, ...],
+    seed: tuple[int, ...],
+    out: Path,
+    manner: Manner = Manner(),
+) -> None:
     """Draw one case and write it.
 
     Parameters
@@ -67,50 +110,68 @@ def draw_case(name: str, kind: str, effects: tuple[str, ...], seed: tuple[int, .
     kind
         One of ``KINDS``.
     effects
-        Identifiers of what to conceal: none, one or two of ``EFFECTS``, or one of ``OUTSIDE``.
+        Identifiers of what to conceal: of ``EFFECTS``, of ``ALL_OUTSIDE``, or (mixed) of each one.
     seed
         Entropy: equal seeds give equal bytes.
     out
         ``out/cases/NAME`` receives the recordings, ``out/sealed/NAME`` the label and the noise-free channels.
+    manner
+        The world, and whether there is a background.
     """
     folder, sealed = out / "cases" / name, out / "sealed" / name
     folder.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
     for attempt in itertools.count():
         try:
-            hidden, conditions, worlds = _recorded(kind, effects, (*seed, attempt), folder)
+            hidden, case, worlds = _recorded(kind, effects, (*seed, attempt), folder, manner)
             break
-        except (
-            ToppledError
-        ):  # a robot this tall, or a ridge this high: nobody would keep the recording; draw again
-            continue
+        # A robot this tall, or a ridge this high: nobody would keep the recording; draw again.
+        except ToppledError:
+            for path in folder.iterdir():
+                path.unlink()
+    plain = {key: worlds.pop(key) for key in list(worlds) if key.endswith("_plain")}
     single: dict[str, Any] = {key: array.astype(np.float32) for key, array in worlds.items()}
     np.savez_compressed(sealed / "truth.npz", **single)
-    about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed), "conditions": asdict(conditions)}
-    about |= {"runs": list(RUNS), "holdout": list(HOLDOUT), "robot": _plain(hidden.robots[0])}
+    runs = list(case.setting.runs)
+    about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed)}
+    about |= {"conditions": _stated(case.conditions), "runs": runs, "holdout": _holdout(len(runs))}
+    about |= {"robot": _plain(hidden.robots[0])}
+    if manner.background or manner.world != "mujoco":
+        about |= {"world": manner.world, "setting": case.setting.as_label()}
+        about |= _measured(hidden, case, worlds | plain)
     (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def _recorded(
-    kind: str, effects: tuple[str, ...], seed: tuple[int, ...], folder: Path
-) -> tuple[Hidden, Conditions, dict[str, Array]]:
+    kind: str, effects: tuple[str, ...], seed: tuple[int, ...], folder: Path, manner: Manner
+) -> tuple[Hidden, Case, dict[str, Array]]:
     """Draw a robot and how it is recorded, and record it."""
-    rng, *run_rngs = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(1 + len(RUNS)))
-    hidden = conceal(kind, effects, rng)
-    conditions = _conditions(rng, hidden)
+    seeds = np.random.SeedSequence(seed)
+    rng = np.random.default_rng(seeds.spawn(1)[0])
+    if manner.background:
+        setting = draw_setting(rng, "line" if _needed(effects) & {"reflection_pct"} else "holds")
+        background = draw_background(rng, manner.world)
+        conditions = _conditions(rng, effects, len(setting.runs))
+        known = {name: number for part in background.recorder.values() for name, number in part.items()}
+        known |= {"log_hz": setting.log_hz, "encoder_step_deg": setting.encoder_step_deg}
+        case = Case(manner, setting, replace(conditions, **known), seeds.spawn(len(setting.runs)))
+        hidden = _conceal_tuned(kind, effects, rng, background, case)
+    else:
+        hidden = conceal(effects, rng)
+        conditions = _conditions(rng, effects, len(RUNS))
+        case = Case(manner, Setting(runs=RUNS), conditions, seeds.spawn(len(RUNS)))
     worlds: dict[str, Array] = {}
-    for run, run_rng in enumerate(run_rngs):
-        path = folder / f"run_{run + 1:02d}_{RUNS[run]}.csv"
-        worlds |= record(path, run, hidden, conditions, run_rng)
-    return hidden, conditions, worlds
+    for run, run_kind in enumerate(case.setting.runs):
+        worlds |= record(folder / f"run_{run + 1:02d}_{run_kind}.csv", run, hidden, case)
+    return hidden, case, worlds
 
 
-def conceal(kind: str, effects: tuple[str, ...], rng: Rng) -> Hidden:
-    """Draw strengths for what a case conceals.
+def conceal(effects: tuple[str, ...], rng: Rng) -> Hidden:
+    """Draw strengths for what a case conceals, in a robot that is nominal otherwise.
 
     Parameters
     ----------
-    kind, effects
+    effects
         As :func:`draw_case` takes them.
     rng
         Source of randomness.
@@ -119,22 +180,114 @@ def conceal(kind: str, effects: tuple[str, ...], rng: Rng) -> Hidden:
     -------
     Hidden
     """
-    if kind == "outside":
-        outside = OUTSIDE[effects[0]]
-        robots, numbers = outside.draw(rng, len(RUNS))
-        label = {"effects": [], "outside": {"id": effects[0], "words": outside.words, "numbers": numbers}}
-        return Hidden(tuple(robots), {}, outside.needs, label)
     least = _DOUBLE_LEAST if len(effects) > 1 else 0.0
-    drawn = {effect: EFFECTS[effect].draw(rng, least) for effect in effects}
-    robot = replace(
-        NEUTRAL, **{field: number for one in drawn.values() for field, number in one.changes.items()}
+    return _hidden([_thing(effect, rng, least, len(RUNS)) for effect in effects], NEUTRAL, len(RUNS))
+
+
+@dataclass(frozen=True)
+class Thing:
+    """One thing concealed: an effect of the catalogue, or physics outside it.
+
+    ``changes``: fields of ``Concealed`` to replace, per recording; ``label``: what the sealed file says.
+    """
+
+    id: str
+    changes: tuple[Mapping[str, Any], ...]
+    label: dict[str, Any]
+
+    def on(self, robots: Sequence[Concealed]) -> tuple[Concealed, ...]:
+        """Conceal it in robots, one per recording."""
+        return tuple(replace(robot, **change) for robot, change in zip(robots, self.changes, strict=True))
+
+
+def _thing(name: str, rng: Rng, least: float, runs: int) -> Thing:
+    if name in EFFECTS:
+        drawn = EFFECTS[name].draw(rng, least)
+        return Thing(name, (drawn.changes,) * runs, {"id": name, "parameters": drawn.parameters})
+    outside = ALL_OUTSIDE[name]
+    robots, numbers = outside.draw(rng, runs, least)
+    changes = tuple(unlike_neutral(robot) for robot in robots)
+    return Thing(name, changes, {"id": name, "words": outside.words, "numbers": numbers})
+
+
+def _hidden(things: Sequence[Thing], off: Concealed, runs: int) -> Hidden:
+    """Put things together; with several, every one of them is also left out."""
+    robots = _with(things, off, runs)
+    without = {
+        thing.id: _with([other for other in things if other is not thing], off, runs)
+        for thing in things
+        if len(things) > 1
+    }
+    outside = next((thing.label for thing in things if thing.id in ALL_OUTSIDE), None)
+    effects = [thing.label for thing in things if thing.id in EFFECTS]
+    return Hidden(robots, off, without, {"effects": effects, "outside": outside})
+
+
+def _with(things: Sequence[Thing], off: Concealed, runs: int) -> tuple[Concealed, ...]:
+    robots: tuple[Concealed, ...] = (off,) * runs
+    for thing in things:
+        robots = thing.on(robots)
+    return robots
+
+
+def _conceal_tuned(
+    kind: str, effects: tuple[str, ...], rng: Rng, background: Background, case: Case
+) -> Hidden:
+    """Scale the background to its size and every thing to a drawn visibility."""
+    runs = len(case.setting.runs)
+    plain = replace(NEUTRAL, base=case.base)
+    chosen = [run for run in (_REHEARSED if runs >= len(RUNS) else range(runs)) if run < runs]
+    acts = [act(run, plain, case) for run in chosen]
+    wanted = float(np.exp(rng.uniform(*np.log(_BACKGROUND_MM))))
+    amounts = _amounts(
+        background, plain, wanted, Rehearsal(case.manner.world, plain, acts, SECONDS, case.conditions)
     )
-    without = (
-        {effect: replace(robot, **_neutral(one.changes)) for effect, one in drawn.items()} if least else {}
-    )
-    needs = tuple(column for effect in effects for column in EFFECTS[effect].needs)
-    named = [{"id": effect, "parameters": one.parameters} for effect, one in drawn.items()]
-    return Hidden((robot,) * len(RUNS), without, needs, {"effects": named, "outside": None})
+    off = background.on(plain, amounts)
+    rehearsal = Rehearsal(case.manner.world, off, acts, SECONDS, case.conditions)
+    loudness = (runs / len(chosen)) ** 0.5
+    things = []
+    for effect in effects:
+        seed = int(rng.integers(2**32))
+        quietest = _QUIETEST if len(effects) == 1 else _QUIETEST_OF_MANY
+        target = float(np.exp(rng.uniform(np.log(quietest), np.log(_LOUDEST))))
+
+        def drawn(share: float, effect: str = effect, seed: int = seed) -> Thing:
+            return _thing(effect, np.random.default_rng(seed), Exactly(share), runs)
+
+        def shown(share: float) -> tuple[Concealed, ...]:
+            robots = drawn(share).on((off,) * runs)
+            return tuple(robots[run] for run in chosen)
+
+        share = tuned(lambda share: loudness * rehearsal.d_prime(shown(share)), target)
+        if kind == "mixed" and effect in EFFECTS:
+            while share < 1.0 and not is_material(rehearsal.size(shown(share))):
+                share = min(share + 0.25, 1.0)
+        things.append(drawn(share))
+    hidden = _hidden(things, off, runs)
+    return replace(hidden, plain=plain, label={**hidden.label, "background": background.as_label(amounts)})
+
+
+def _amounts(
+    background: Background, plain: Concealed, wanted_mm: float, rehearsal: Rehearsal
+) -> dict[str, float]:
+    """Find shares of a background's kinds that together move the robot as far as wanted, each about as far."""
+
+    def excess(amounts: Mapping[str, float]) -> float:
+        found = rehearsal.size([background.on(plain, amounts)] * rehearsal.count)
+        return max(found["mm_drive"] / wanted_mm, found["deg_drive"] / _BACKGROUND_DEG)
+
+    each = len(background.moving) ** 0.5
+    amounts = {kind: 1.0 / max(excess({kind: 1.0}) * each, 1.0) for kind in background.moving}
+    together = max(excess(amounts), 1.0)
+    return {kind: round(amount / together, 6) for kind, amount in amounts.items()}
+
+
+def act(run: int, robot: Concealed, case: Case) -> Act:
+    """Let a robot choose the commands of one recording: a line follower's depend on who drives."""
+    start, controller = _task(case.setting.runs[run], np.random.default_rng(case.seeds[run]), case.base)
+    ticks = case.conditions.row_ticks
+    history = truth(case.manner.world, robot).run(start, controller, SECONDS, turn_ticks=ticks)
+    return Act(start, history.commands[::ticks], case.conditions.camera_offset_s(run))
 
 
 def seal(out: Path) -> str:
@@ -176,59 +329,85 @@ def broken_seals(out: Path) -> list[str]:
     return [name for digest, name in entries if not (out / name).is_file() or _digest(out / name) != digest]
 
 
-def record(path: Path, run: int, hidden: Hidden, conditions: Conditions, rng: Rng) -> dict[str, Array]:
+def record(path: Path, run: int, hidden: Hidden, case: Case) -> dict[str, Array]:
     """Drive one recording, write it, and return the noise-free channels of every world."""
-    robot, offset = hidden.robots[run], conditions.camera_offset_s(run)
-    start, controller = _task(RUNS[run], rng)
+    robot, conditions, rng = hidden.robots[run], case.conditions, np.random.default_rng(case.seeds[run])
+    offset, ticks = conditions.camera_offset_s(run), conditions.row_ticks
+    start, controller = _task(case.setting.runs[run], rng, case.base)
     rows = round(SECONDS * 100) + 1
     reading_noise = np.repeat(noise("reflection_pct", rows, conditions, rng), ROW_TICKS)[
         : (rows - 1) * ROW_TICKS + 1
     ]
-    history = Truth(robot).run(start, controller, SECONDS, reading_noise)
-    clean = channels(history, robot, offset)
-    write_recording(path, history, clean, conditions, rng)
-    commands = history.commands[::ROW_TICKS]
-    worlds = {f"run{run}_on": _stacked(clean), f"run{run}_commands": commands}
-    if robot == NEUTRAL:
-        return worlds
-    for label, other in {
-        "off": NEUTRAL,
-        **{f"without_{key}": one for key, one in hidden.without.items()},
-    }.items():
-        replay = Truth(other).run(start, replayed(commands), SECONDS)
-        view = channels(replace(replay, light=_along(history, other)), other, offset)
-        worlds[f"run{run}_{label}"] = _stacked(view)
+    history = truth(case.manner.world, robot).run(start, controller, SECONDS, reading_noise, ticks)
+    written = even_ticks(history, ticks)
+    clean = channels(history, robot, offset, written)
+    write_recording(path, history, clean, conditions, rng, base=case.base)
+    commands = history.commands[::ticks]
+    worlds = {f"run{run}_on": stacked(clean), f"run{run}_commands": commands}
+    others = {"off": hidden.off, **{f"without_{key}": each[run] for key, each in hidden.without.items()}}
+    if hidden.plain is not None:
+        others["plain"] = hidden.plain
+    for label, other in others.items():
+        if other == robot:
+            continue
+        replay = truth(case.manner.world, other).run(
+            start, replayed(commands, ticks), SECONDS, turn_ticks=ticks
+        )
+        view = channels(replace(replay, light=along(history, other)), other, offset, written)
+        worlds[f"run{run}_{label}"] = stacked(view)
     return worlds
 
 
-def _task(kind: str, rng: Rng) -> tuple[Pose, Controller]:
+def _measured(hidden: Hidden, case: Case, worlds: Mapping[str, Array]) -> dict[str, Any]:
+    """Say how visible, and how large, each thing concealed and the background are."""
+    runs = range(len(case.setting.runs))
+
+    def pairs(with_it: str, without_it: str) -> list[tuple[Array, Array]]:
+        found = []
+        for run in runs:
+            on = worlds[f"run{run}_on"]
+            found.append((worlds.get(f"run{run}_{with_it}", on), worlds.get(f"run{run}_{without_it}", on)))
+        return found
+
+    ids = [effect["id"] for effect in hidden.label["effects"]]
+    ids += [hidden.label["outside"]["id"]] if hidden.label["outside"] else []
+    absent = {name: f"without_{name}" if len(ids) > 1 else "off" for name in ids}
+    sizes = {name: size(pairs("on", other)) for name, other in absent.items()}
+    if hidden.plain is not None:
+        sizes["background"] = size(pairs("off", "plain"))
+    loud = {
+        name: round(visibility(worlds, "on", other, case.conditions).d_prime, 3)
+        for name, other in absent.items()
+    }
+    return {"d_prime": loud, "size": sizes}
+
+
+def _task(kind: str, rng: Rng, base: Base) -> tuple[Pose, Controller]:
     if kind.startswith("line"):
         return line_follower(kind, rng)
-    start, commands = script(kind, rng)
+    start, commands = script(kind, rng, base)
     return start, replayed(commands)
 
 
-def _along(history: History, other: Concealed) -> Array:
-    """Let another robot's sensor look along this run's path, so that sensor and motion effects stay apart."""
-    sensor = ColourSensor(other)
-    return np.array([sensor.look(*pose) for pose in history.pose.tolist()])
-
-
-def _conditions(rng: Rng, hidden: Hidden) -> Conditions:
+def _conditions(rng: Rng, effects: Sequence[str], runs: int) -> Conditions:
     """Draw how a case is recorded; what the hidden effect needs to show at all is never left out."""
     away = {"battery_v"} if rng.random() < 0.4 else set()
     away |= {"yaw_rate_dps"} if rng.random() < 0.7 else set()
-    away |= _gap(float(rng.random())) - set(hidden.needs)
-    tied = any(effect["id"] == "pose_delay" for effect in hidden.label["effects"])
-    offsets = tuple(float(offset) for offset in rng.uniform(-0.015, 0.015, len(RUNS)))
+    away |= _gap(float(rng.random())) - _needed(effects)
+    offsets = tuple(float(offset) for offset in rng.uniform(-0.015, 0.015, runs))
     return Conditions(
         columns=tuple(name for name in CHANNELS if name not in away),
         noise_level=float(2.0 ** rng.uniform(-1.0, 1.0)),
         coloured_share=float(rng.uniform(0.2, 0.6)) if rng.random() < 0.4 else 0.0,
         coloured_time_s=float(rng.uniform(0.05, 0.5)),
         camera_hz=float(rng.choice([25.0, 30.0, 30.0, 100.0 / 3.0, 50.0])),
-        camera_offsets_s=offsets if rng.random() < 0.2 and not tied else (),
+        camera_offsets_s=offsets if rng.random() < 0.2 and "pose_delay" not in effects else (),
     )
+
+
+def _needed(effects: Sequence[str]) -> set[str]:
+    """Columns without which what is concealed leaves no trace."""
+    return {column for name in effects for column in {**EFFECTS, **ALL_OUTSIDE}[name].needs}
 
 
 def _gap(chance: float) -> set[str]:
@@ -239,17 +418,28 @@ def _gap(chance: float) -> set[str]:
     return set()
 
 
-def _neutral(changes: Any) -> dict[str, Any]:
-    return {field: getattr(NEUTRAL, field) for field in changes}
+def _holdout(runs: int) -> list[int]:
+    """Places of the recordings to judge by."""
+    return list(range(runs - _HELD_OUT, runs)) if runs > _HELD_OUT else []
 
 
-def _stacked(clean: dict[str, Array]) -> Array:
-    return np.column_stack([clean[name] for name in CHANNELS])
+def _stated(conditions: Conditions) -> dict[str, Any]:
+    """Give the conditions; what only backgrounds and settings change, where it is not as usual."""
+    usual = {field.name: field.default for field in fields(Conditions)}
+    rare = ("log_hz", "encoder_step_deg", "jitter_s", "dropped_share")
+    return {
+        key: number for key, number in asdict(conditions).items() if key not in rare or number != usual[key]
+    }
+
+
+def unlike_neutral(robot: Concealed) -> dict[str, Any]:
+    """Give the fields that are not those of a robot that conceals nothing."""
+    return {field: number for field, number in vars(robot).items() if number != getattr(NEUTRAL, field)}
 
 
 def _plain(robot: Concealed) -> dict[str, Any]:
     """Give the fields that are not neutral."""
-    return {field: number for field, number in asdict(robot).items() if number != getattr(NEUTRAL, field)}
+    return {field: number for field, number in asdict(robot).items() if field in unlike_neutral(robot)}
 
 
 def _digest(path: Path) -> str:

@@ -10,18 +10,13 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.concealed.history import Array
 from benchmarks.concealed.recording import ANGLES, CHANNELS, NOISE, POSE, Conditions, camera_rows
-from benchmarks.concealed.truth import Array
 
 Rows = npt.NDArray[np.intp]
 
-WINDOW_ROWS = 200  # 2 s: the longest windows that replays are re-based in
-_STEP = {
-    "left_angle_deg": 1.0,
-    "right_angle_deg": 1.0,
-    "reflection_pct": 1.0,
-    "yaw_rate_dps": 0.1,
-}  # of rounding
+WINDOW_S = 2.0  # the longest windows that replays are re-based in
+_STEP = {"reflection_pct": 1.0, "yaw_rate_dps": 0.1}  # of rounding; the encoders' is a case's own
 
 
 @dataclass(frozen=True)
@@ -49,7 +44,7 @@ def visibility(
     with_it: str,
     without_it: str,
     conditions: Conditions,
-    window_rows: int = WINDOW_ROWS,
+    window_s: float = WINDOW_S,
 ) -> Visibility:
     """Compare two worlds that were given the same commands.
 
@@ -61,8 +56,8 @@ def visibility(
         Names of the two worlds: ``on`` and ``off``, or ``on`` and ``without_ID``.
     conditions
         The case's noise, columns and camera rate.
-    window_rows
-        The pose and the angles are re-based this often, so that a difference counts where it arises.
+    window_s
+        The pose and the angles are re-based this often [s], so that a difference counts where it arises.
 
     Returns
     -------
@@ -75,13 +70,15 @@ def visibility(
         there = np.asarray(worlds[f"run{run}_{with_it}"], dtype=np.float64)
         name = f"run{run}_{without_it}"
         absent = np.asarray(worlds[name], dtype=np.float64) if name in worlds else there
-        energies.append(_run_energy(there, absent, conditions, window_rows))
+        energies.append(_run_energy(there, absent, conditions, round(window_s * conditions.log_hz)))
     return Visibility(np.stack(energies))
 
 
 def _run_energy(there: Array, absent: Array, conditions: Conditions, window_rows: int) -> Array:
     energy = np.zeros_like(there)
-    frames = camera_rows(np.arange(len(there), dtype=np.float64) * 0.01, conditions.camera_hz) > 0.0
+    frames = (
+        camera_rows(np.arange(len(there), dtype=np.float64) / conditions.log_hz, conditions.camera_hz) > 0.0
+    )
     for first in range(0, len(there) - window_rows, window_rows):
         rows = np.arange(first, first + window_rows)
         for k, name in enumerate(CHANNELS):
@@ -133,18 +130,20 @@ def _remainder(signal: Array, nuisance: Array) -> Array:
 
 
 def _whitener(name: str, rows: tuple[int, ...], conditions: Conditions) -> Array:
-    return _inverse_root(
-        name, rows, conditions.noise_level, conditions.coloured_share, conditions.coloured_time_s
-    )
+    noise = (conditions.noise_level, conditions.coloured_share, conditions.coloured_time_s)
+    step = float(conditions.encoder_step_deg) if name in ANGLES else _STEP.get(name, 0.0)
+    return _inverse_root(name, rows, *noise, step, 1.0 / conditions.log_hz)
 
 
 @cache
-def _inverse_root(name: str, rows: tuple[int, ...], level: float, share: float, time_s: float) -> Array:
+def _inverse_root(
+    name: str, rows: tuple[int, ...], level: float, share: float, time_s: float, step: float, row_s: float
+) -> Array:
     """Inverse Cholesky factor of the noise covariance over these rows: sensor noise and rounding."""
     variance = (NOISE.get(name, 0.0) * level) ** 2
-    apart = np.abs(np.subtract.outer(rows, rows)) * 0.01
+    apart = np.abs(np.subtract.outer(rows, rows)) * row_s
     covariance = variance * share * np.exp(-apart / time_s)
-    covariance += np.eye(len(rows)) * (variance * (1.0 - share) + _STEP.get(name, 0.0) ** 2 / 12.0)
+    covariance += np.eye(len(rows)) * (variance * (1.0 - share) + step**2 / 12.0)
     inverse: Array = np.linalg.inv(np.linalg.cholesky(covariance))
     return inverse
 

@@ -44,9 +44,14 @@ class Effect:
     needs: tuple[str, ...] = ()
 
 
+class Exactly(float):
+    """A share of the log range to take as it is; less than 0 is weaker than the range's lower end."""
+
+
 def strength(rng: Rng, low: float, high: float, least: float) -> float:
-    """Draw log-uniformly between bounds, from a share ``least`` of the log range upwards."""
-    share = least + (1.0 - least) * rng.random()
+    """Draw log-uniformly between bounds, from a share ``least`` of the log range upwards, or ``Exactly`` there."""
+    drawn = rng.random()
+    share = float(least) if isinstance(least, Exactly) else least + (1.0 - least) * drawn
     return float(low * (high / low) ** share)
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.history import Array
 from benchmarks.concealed.recording import CHANNELS
-from benchmarks.concealed.truth import Array
 
 LARGEST_SET = 4  # an `or` of more names than this names nothing
-BIN_ROWS = 20  # places in time are compared in steps of 0.2 s
+BIN_S = 0.2  # places in time are compared in steps of so long
 _CHANNEL_SHARE = 0.25  # of the loudest group: a located channel at least that loud is where the effect shows
 _TO_SI = {"deg": math.pi / 180.0, "ms": 1e-3, "mm": 1e-3, "cm": 1e-2, "%": 1e-2, "mV/s": 1e-3, "mohm": 1e-3}
 
@@ -163,7 +163,7 @@ def group_of(channel: str) -> str:
 def _overlap(place: Mapping[str, Any], timeline: Array, runs: Sequence[str]) -> float:
     """Energy inside the time spans, over the most that spans of the same total length could hold."""
     chosen = np.zeros(timeline.shape, dtype=bool)
-    recording, step = str(place.get("recording", "")), BIN_ROWS * 0.01
+    recording, step = str(place.get("recording", "")), BIN_S
     for run in range(len(runs)):
         if recording and not recording.startswith(f"run_{run + 1:02d}"):
             continue

@@ -13,7 +13,7 @@ from benchmarks.concealed.effects import Rng, strength
 from benchmarks.concealed.robot import NEUTRAL, Concealed
 
 # One robot per recording: weather and radio differ from run to run, everything else is the same.
-Draw = Callable[[Rng, int], tuple[list[Concealed], dict[str, Any]]]
+Draw = Callable[[Rng, int, float], tuple[list[Concealed], dict[str, Any]]]
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,18 @@ class Outside:
     words
         What an honest report would have to describe.
     draw
-        From randomness and a number of recordings to robots and the label's numbers.
+        From randomness, a number of recordings and the least strength, as a share of the log range, to robots and
+        the label's numbers.
     needs
         Columns without which it leaves no trace.
+    last
+        Whether it is kept for the last examination.
     """
 
     words: str
     draw: Draw
     needs: tuple[str, ...] = ()
+    last: bool = False
 
 
 def _phase(rng: Rng) -> float:
@@ -47,38 +51,38 @@ def _same(runs: int, numbers: dict[str, Any], **changes: Any) -> tuple[list[Conc
     return [replace(NEUTRAL, **changes)] * runs, numbers
 
 
-def _off_centre(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    offset = strength(rng, 0.002, 0.006, 0.0)
+def _off_centre(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    offset = strength(rng, 0.002, 0.006, least)
     return _same(runs, {"offset_m": offset}, off_centre=(offset, _phase(rng), _phase(rng)))
 
 
-def _oval(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    half = strength(rng, 0.0008, 0.003, 0.0)
+def _oval(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    half = strength(rng, 0.0008, 0.003, least)
     return _same(runs, {"half_axes_differ_m": 2.0 * half}, oval=(half, _phase(rng), _phase(rng)))
 
 
-def _tether(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _tether(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     x, y = float(rng.uniform(0.4, 2.0)), float(rng.uniform(0.2, 1.0))
-    stiffness = strength(rng, 0.4, 2.5, 0.0)
+    stiffness = strength(rng, 0.4, 2.5, least)
     return _same(runs, {"x_m": x, "y_m": y, "n_per_m": stiffness}, tether=(x, y, stiffness))
 
 
-def _magnet(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _magnet(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     x, y, core = float(rng.uniform(0.9, 1.5)), float(rng.uniform(0.45, 0.75)), float(rng.uniform(0.10, 0.25))
-    pull = strength(rng, 0.4, 2.5, 0.0)
+    pull = strength(rng, 0.4, 2.5, least)
     return _same(runs, {"x_m": x, "y_m": y, "core_m": core, "pull_n": pull}, magnet=(x, y, core, pull))
 
 
-def _waves(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    slope, length = strength(rng, 0.015, 0.10, 0.0), float(rng.uniform(0.2, 0.5))
+def _waves(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    slope, length = strength(rng, 0.015, 0.10, least), float(rng.uniform(0.2, 0.5))
     return _same(
         runs, {"slope_rad": slope, "length_m": length}, waves=(slope, length, _phase(rng), _phase(rng))
     )
 
 
-def _gusts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _gusts(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     """Draw eight gusts a run, each from anywhere."""
-    force = strength(rng, 0.4, 2.5, 0.0)
+    force = strength(rng, 0.4, 2.5, least)
 
     def gust() -> tuple[float, float, float, float]:
         way, length = _phase(rng), float(rng.uniform(0.15, 0.6))
@@ -88,40 +92,40 @@ def _gusts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
     return robots, {"force_n": force}
 
 
-def _air_drag(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    drag = strength(rng, 2.0, 20.0, 0.0)
+def _air_drag(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    drag = strength(rng, 2.0, 20.0, least)
     return _same(runs, {"n_s2_per_m2": drag}, air_drag=drag)
 
 
-def _bump(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _bump(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     """Lay a ridge where line followers pass and no recording starts."""
     height, x, angle = (
-        strength(rng, 0.0012, 0.004, 0.0),
+        strength(rng, 0.0012, 0.004, least),
         float(rng.uniform(0.5, 0.7)),
         float(rng.uniform(-0.3, 0.3)),
     )
     return _same(runs, {"height_m": height, "x_m": x, "angle_rad": angle}, bump=(height, x, angle))
 
 
-def _lens(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _lens(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     """Bend the picture: at 1 m from the middle a pose is off by that many metres."""
-    bend = _sign(rng) * strength(rng, 0.03, 0.2, 0.0)
+    bend = _sign(rng) * strength(rng, 0.03, 0.2, least)
     return _same(runs, {"per_m2": bend}, lens=bend)
 
 
-def _ambient(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    loss, source = strength(rng, 0.05, 0.4, 0.0), _phase(rng)
+def _ambient(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    loss, source = strength(rng, 0.05, 0.4, least), _phase(rng)
     return _same(runs, {"loss": loss, "heading_rad": source}, ambient=(loss, source))
 
 
-def _pose_drift(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
-    rate = _sign(rng) * strength(rng, 0.1, 1.0, 0.0)
+def _pose_drift(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+    rate = _sign(rng) * strength(rng, 0.1, 1.0, least)
     return _same(runs, {"deg_per_s": rate}, pose_drift_deg=rate)
 
 
-def _dropouts(rng: Rng, runs: int) -> tuple[list[Concealed], dict[str, Any]]:
+def _dropouts(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
     """Lose the radio link a few times a run."""
-    length, count = strength(rng, 0.05, 0.3, 0.0), int(rng.integers(4, 10))
+    length, count = strength(rng, 0.05, 0.3, least), int(rng.integers(4, 10))
     robots = []
     for _ in range(runs):
         starts = np.sort(rng.uniform(0.3, 11.5, count))

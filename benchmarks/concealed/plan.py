@@ -4,26 +4,41 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.concealed.cases import broken_seals, draw_case, seal
+from benchmarks.concealed.cases import (
+    ALL_OUTSIDE,
+    Manner,
+    broken_seals,
+    draw_case,
+    seal,
+    unlike_neutral,
+)
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.outside import OUTSIDE
+from benchmarks.concealed.worlds import holds
+
+_ALIKE = 1.0 / 3.0  # share of pairs from one group
 
 
 @dataclass(frozen=True)
 class Counts:
-    """How many cases of each kind; single and outside ones are spread evenly over what there is to conceal."""
+    """How many cases of each kind; single and outside ones are spread evenly over what there is to conceal.
+
+    ``triple`` and ``mixed`` cases have a background: the first examinations had none of them.
+    """
 
     none: int = 100
     single: int = 5 * len(EFFECTS)
     double: int = 40
     outside: int = 3 * len(OUTSIDE)
+    triple: int = 0
+    mixed: int = 0
 
 
 @dataclass(frozen=True)
@@ -34,9 +49,16 @@ class Planned:
     kind: str
     effects: tuple[str, ...]
     seed: tuple[int, ...]
+    manner: Manner
 
 
-def plan(seed: int, counts: Counts) -> list[Planned]:
+def plan(
+    seed: int,
+    counts: Counts | Mapping[str, Counts],
+    *,
+    background: bool = False,
+    last: bool = False,
+) -> list[Planned]:
     """List the cases of an examination.
 
     Parameters
@@ -44,7 +66,11 @@ def plan(seed: int, counts: Counts) -> list[Planned]:
     seed
         Of the whole examination.
     counts
-        How many of each kind.
+        How many of each kind, in MuJoCo's world or by world.
+    background
+        Whether robots have a background; see :class:`benchmarks.concealed.cases.Manner`.
+    last
+        Whether the kinds kept for the last examination are drawn, too.
 
     Returns
     -------
@@ -52,15 +78,41 @@ def plan(seed: int, counts: Counts) -> list[Planned]:
         In an order, and under names, that give nothing away.
     """
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0)))
-    contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
-    contents += [("single", (effect,)) for effect in _spread(EFFECTS, counts.single, rng)]
-    contents += [("double", _pair(rng)) for _ in range(counts.double)]
-    contents += [("outside", (kind,)) for kind in _spread(OUTSIDE, counts.outside, rng)]
+    contents: list[tuple[str, tuple[str, ...], Manner]] = []
+    for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
+        manner = Manner(world, background)
+        contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, last)]
     order = rng.permutation(len(contents))
     return [
-        Planned(f"c{place + 1:03d}", contents[index][0], contents[index][1], (seed, 1 + int(index)))
+        Planned(f"c{place + 1:03d}", *contents[index][:2], (seed, 1 + int(index)), contents[index][2])
         for place, index in enumerate(order)
     ]
+
+
+def outside_kinds(manner: Manner, *, last: bool) -> list[str]:
+    """List the kinds outside the catalogue that can be drawn: without a background, those of the first examinations."""
+    kinds = ALL_OUTSIDE if manner.background else OUTSIDE
+    rng = np.random.default_rng(0)
+    return [
+        name
+        for name, kind in kinds.items()
+        if (last or not kind.last) and holds(manner.world, unlike_neutral(kind.draw(rng, 1, 0.0)[0][0]))
+    ]
+
+
+def _contents(
+    counts: Counts, rng: np.random.Generator, manner: Manner, last: bool
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Say what the cases of one world conceal."""
+    kinds = outside_kinds(manner, last=last)
+    contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
+    contents += [("single", (effect,)) for effect in _spread(EFFECTS, counts.single, rng)]
+    contents += [("double", _several(2, rng, alike=manner.background)) for _ in range(counts.double)]
+    contents += [("outside", (kind,)) for kind in _spread(kinds, counts.outside, rng)]
+    contents += [("triple", _several(3, rng, alike=False)) for _ in range(counts.triple)]
+    for kind in _spread(kinds, counts.mixed, rng):
+        contents.append(("mixed", (_several(1, rng, alike=False)[0], kind)))
+    return contents
 
 
 def draw_all(cases: Iterable[Planned], out: Path, workers: int) -> str:
@@ -93,7 +145,8 @@ def draw_all(cases: Iterable[Planned], out: Path, workers: int) -> str:
     missing = [case for case in cases if not (out / "sealed" / case.name / "label.json").exists()]
     with ProcessPoolExecutor(workers) as pool:
         jobs = [
-            pool.submit(draw_case, case.name, case.kind, case.effects, case.seed, out) for case in missing
+            pool.submit(draw_case, case.name, case.kind, case.effects, case.seed, out, case.manner)
+            for case in missing
         ]
         for done, job in enumerate(as_completed(jobs), start=1):
             job.result()
@@ -114,10 +167,12 @@ def _spread(names: Iterable[str], count: int, rng: np.random.Generator) -> list[
     return [order[place % len(order)] for place in range(count)]
 
 
-def _pair(rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw two effects that do not imitate each other."""
+def _several(count: int, rng: np.random.Generator, *, alike: bool) -> tuple[str, ...]:
+    """Draw effects that do not imitate each other; or, if wanted, in a third of the draws some that may."""
     names = list(EFFECTS)
+    may = alike and rng.random() < _ALIKE
     while True:
-        first, second = (names[int(k)] for k in rng.choice(len(names), 2, replace=False))
-        if EFFECTS[first].group != EFFECTS[second].group:
-            return first, second
+        drawn = tuple(names[int(k)] for k in rng.choice(len(names), count, replace=False))
+        groups = len({EFFECTS[name].group for name in drawn})
+        if groups == (1 if may else count):
+            return drawn

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.concealed.detectability import Visibility, visibility
-from benchmarks.concealed.judging import BIN_ROWS, group_shares
+from benchmarks.concealed.judging import BIN_S, group_shares
 from benchmarks.concealed.recording import Conditions
 
 
@@ -42,9 +42,9 @@ def sight(out: Path, name: str) -> dict[str, Any]:
     whole = visibility(worlds, "on", "off", conditions)
     return {
         "d_prime": _d_primes(label, worlds, conditions, whole),
-        "d_prime_run": visibility(worlds, "on", "off", conditions, 1200).d_prime,
+        "d_prime_run": visibility(worlds, "on", "off", conditions, 12.0).d_prime,
         "groups": group_shares(whole.by_channel()),
-        "timeline": _timeline(whole),
+        "timeline": _timeline(whole, round(BIN_S * conditions.log_hz)),
     }
 
 
@@ -85,16 +85,15 @@ def conditions_of(label: Mapping[str, Any]) -> Conditions:
 def _d_primes(
     label: Mapping[str, Any], worlds: Mapping[str, Any], conditions: Conditions, whole: Visibility
 ) -> dict[str, float]:
-    if label["kind"] == "outside":
-        return {label["outside"]["id"]: whole.d_prime}
     ids = [effect["id"] for effect in label["effects"]]
+    ids += [label["outside"]["id"]] if label["outside"] else []
     if len(ids) == 1:
         return {ids[0]: whole.d_prime}
     return {effect: visibility(worlds, "on", f"without_{effect}", conditions).d_prime for effect in ids}
 
 
-def _timeline(whole: Visibility) -> list[list[float]]:
+def _timeline(whole: Visibility, rows: int) -> list[list[float]]:
     energy = whole.energy.sum(axis=2)
-    bins = energy.shape[1] // BIN_ROWS
-    summed = energy[:, : bins * BIN_ROWS].reshape(len(energy), bins, BIN_ROWS).sum(axis=2)
+    bins = energy.shape[1] // rows
+    summed = energy[:, : bins * rows].reshape(len(energy), bins, rows).sum(axis=2)
     return [[round(float(value), 2) for value in row] for row in summed]

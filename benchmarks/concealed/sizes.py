@@ -1,0 +1,60 @@
+"""How far apart two worlds drive, in units people know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from benchmarks.concealed.history import Array
+from benchmarks.concealed.recording import CHANNELS, POSE
+
+_POSE_AT = [CHANNELS.index(name) for name in POSE]
+_LIGHT_AT = CHANNELS.index("reflection_pct")
+# From here on what is concealed matters to somebody who drives a course.
+MATERIAL = {"mm_1m": 10.0, "deg_1m": 2.0, "reading_pct": 3.0}
+
+
+def size(pairs: Iterable[tuple[Array, Array]]) -> dict[str, float]:
+    """Compare the recorded channels of two worlds that were given the same commands.
+
+    Parameters
+    ----------
+    pairs
+        For every recording, noise-free channels (rows, channels) with and without what is concealed.
+
+    Returns
+    -------
+    dict[str, float]
+        The largest over the recordings: distance of the axle's centre [mm] and of the heading [deg] after the first
+        metre of the way (``mm_1m``, ``deg_1m``; 0 where none is that long) and at the end (``mm_drive``,
+        ``deg_drive``), both counted from the start; root mean square of the reflection's difference along the same
+        path (``reading_pct``).
+    """
+    most = dict.fromkeys(("mm_1m", "deg_1m", "mm_drive", "deg_drive", "reading_pct"), 0.0)
+    for there, absent in pairs:
+        here, other = _from_start(there[:, _POSE_AT]), _from_start(absent[:, _POSE_AT])
+        apart = 1e3 * np.hypot(*(here - other)[:, :2].T)
+        turned = np.abs(here - other)[:, 2]
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(other[:, :2], axis=0).T))])
+        light = np.clip(there[:, _LIGHT_AT], 0.0, 100.0) - np.clip(absent[:, _LIGHT_AT], 0.0, 100.0)
+        found = {"mm_drive": apart[-1], "deg_drive": turned[-1], "reading_pct": np.sqrt(np.mean(light**2))}
+        if way[-1] >= 1.0:
+            metre = int(np.searchsorted(way, 1.0))
+            found |= {"mm_1m": apart[metre], "deg_1m": turned[metre]}
+        most = {name: max(value, float(found.get(name, 0.0))) for name, value in most.items()}
+    return {name: round(value, 3) for name, value in most.items()}
+
+
+def is_material(sizes: dict[str, float]) -> bool:
+    """Say whether a difference matters to somebody who drives a course."""
+    return any(sizes[name] >= least for name, least in MATERIAL.items())
+
+
+def _from_start(pose: Array) -> Array:
+    """Pose [m, m, deg] counted from where, and how, the recording begins."""
+    turn = np.radians(pose[0, 2])
+    arm = pose[:, :2] - pose[0, :2]
+    ahead = np.cos(turn) * arm[:, 0] + np.sin(turn) * arm[:, 1]
+    left = np.cos(turn) * arm[:, 1] - np.sin(turn) * arm[:, 0]
+    return np.column_stack([ahead, left, pose[:, 2] - pose[0, 2]])
