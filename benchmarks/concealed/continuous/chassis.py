@@ -104,10 +104,10 @@ def _step_body(
         rolling = ahead - b[RATE] * lever
         slip_x = rolling - radius * b[WHEEL_SPEED + side]
         slip_y = left - b[RATE] * n.com_ahead
-        grip = _grip(n, b, side, axle_x, axle_y)
+        holding = grip(n, b, side, axle_x, axle_y)
         tread = b[TREAD + 2 * side : TREAD + 2 * side + 2]
         push_x, push_y = _tyre(
-            n, tread, slip_x, slip_y, radius * b[WHEEL_SPEED + side], grip, loads[side], dt
+            n, tread, slip_x, slip_y, radius * b[WHEEL_SPEED + side], holding, loads[side], dt
         )
         inertia = 0.5 * WHEEL_MASS * radius * radius
         brake = (
@@ -198,15 +198,15 @@ def _shape(n: Numbers, side: int, angle: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True)
-def _grip(n: Numbers, b: npt.NDArray[np.float64], side: int, x: float, y: float) -> float:
+def grip(n: Numbers, b: npt.NDArray[np.float64], side: int, x: float, y: float) -> float:
     """Friction of one tyre where it is now."""
-    grip = n.grip
+    coefficient = n.grip
     if n.patch_radius > 0.0 and math.hypot(x - n.patch_x, y - n.patch_y) < n.patch_radius:
-        grip = n.patch_grip
+        coefficient = n.patch_grip
     if n.dust > 0.0:
-        grip *= 1.0 - n.dust * (1.0 - math.exp(-b[ROLLED] / n.dust_way))
+        coefficient *= 1.0 - n.dust * (1.0 - math.exp(-b[ROLLED] / n.dust_way))
     fast = n.hop > 0.0 and n.hop_side == side and abs(b[WHEEL_SPEED + side]) > n.hop_speed
-    return grip * (1.0 - n.hop) if fast and math.sin(b[WHEEL + side]) > 0.0 else grip
+    return coefficient * (1.0 - n.hop) if fast and math.sin(b[WHEEL + side]) > 0.0 else coefficient
 
 
 @numba.njit(cache=True)

@@ -78,6 +78,37 @@ def step_drive(
 
 
 @numba.njit(cache=True)
+def drive_on(
+    n: Numbers,
+    d: npt.NDArray[np.float64],
+    duties: npt.NDArray[np.float64],
+    wheel_angles: npt.NDArray[np.float64],
+    wheel_speeds: npt.NDArray[np.float64],
+    time_s: float,
+    tick_s: float,
+    dt: float,
+    steps: int,
+) -> npt.NDArray[np.float64]:
+    """Advance by some steps while the wheels keep their speeds; give the mean torques that reach them (2,) [N m].
+
+    Parameters
+    ----------
+    n, d, duties, wheel_angles, wheel_speeds, time_s, dt
+        As :func:`step_drive` takes them, at the beginning.
+    tick_s
+        Length of a step by the log's clock [s].
+    steps
+        How many.
+    """
+    torques, total = np.zeros(2), np.zeros(2)
+    for step in range(steps):
+        angles = wheel_angles + dt * step * wheel_speeds
+        step_drive(n, d, duties, angles, wheel_speeds, time_s + tick_s * step, dt, torques)
+        total += torques
+    return total / steps
+
+
+@numba.njit(cache=True)
 def _motor(
     n: Numbers,
     d: npt.NDArray[np.float64],
