@@ -245,7 +245,7 @@ def test_results_count_only_what_ended(examination, tmp_path):
     for name, seen in (("gecar", ["a", "b"]), ("bic", ["b"])):
         verdicts, journal = examination / "verdicts" / name, examination / "outcomes" / f"{name}.jsonl"
         run_all(examination / "cases", verdicts, tool, 1, 60.0, seen, journal)
-    write_results(examination, Terms(1, 1, 1, 0, 1), tmp_path / "RESULTS.md", 1)
+    write_results(examination, Terms(1, {"mujoco": Counts(1, 1, 0, 1)}), tmp_path / "RESULTS.md", 1)
     text = (tmp_path / "RESULTS.md").read_text()
     assert "2 of 3 sealed cases have a verdict" in text
     assert "| `gecar discover` | 1 of 1 | 0 of 1 | 0 of 1 |" in text
@@ -255,10 +255,10 @@ def test_results_count_only_what_ended(examination, tmp_path):
 
 
 def test_examination_goes_on_with_the_seed_it_began_with(tmp_path):
-    begun = agreed(tmp_path, None, Counts(none=1))
-    assert agreed(tmp_path, None, Counts()) == begun
+    begun = agreed(tmp_path, None, {"mujoco": Counts(none=1)})
+    assert agreed(tmp_path, None, {"mujoco": Counts()}) == begun
     with pytest.raises(ValueError, match="seed"):
-        agreed(tmp_path, begun.seed + 1, Counts())
+        agreed(tmp_path, begun.seed + 1, {"mujoco": Counts()})
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -205,7 +205,6 @@ def _counts(chosen: argparse.Namespace, whole: Counts) -> Counts:
 
 def _exam(chosen: argparse.Namespace) -> int:
     from benchmarks.concealed.exam import COMPARATORS, GECAR, agreed, examine  # noqa: PLC0415
-    from benchmarks.concealed.plan import Counts  # noqa: PLC0415
     from benchmarks.concealed.results import write_results  # noqa: PLC0415
 
     tools = chosen.tools.split(",") if chosen.tools else [GECAR, *COMPARATORS]
@@ -214,7 +213,7 @@ def _exam(chosen: argparse.Namespace) -> int:
             f"--tools: found {', '.join(strangers)}, expected some of: {', '.join((GECAR, *COMPARATORS))}"
         )
         raise ValueError(message)
-    terms = agreed(chosen.out, chosen.seed, _counts(chosen, Counts()))
+    terms = agreed(chosen.out, chosen.seed, _by_world(chosen), background=chosen.background == "on")
     stopped = 0
     try:
         examine(

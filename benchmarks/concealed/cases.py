@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,8 @@ _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
 _QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
 _REHEARSED = (0, 2, 3, 4)  # of eight recordings: enough to learn how loud something is
-_BACKGROUND_MM = (1.0, 6.0)  # how far a background moves the robot within a recording, and
-_BACKGROUND_DEG = 1.5  # turns it at most
+_BACKGROUND_MM = (1.0, 5.0)  # how far a background moves the robot within a recording, and
+_BACKGROUND_DEG = 1.2  # turns it, as rehearsed: on the way itself it may be a little more
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,9 @@ def draw_case(
         except ToppledError:
             for path in folder.iterdir():
                 path.unlink()
-    plain = {key: worlds.pop(key) for key in list(worlds) if key.endswith("_plain")}
-    single: dict[str, Any] = {key: array.astype(np.float32) for key, array in worlds.items()}
+    single: dict[str, Any] = {
+        key: array.astype(np.float32) for key, array in worlds.items() if not key.endswith("_plain")
+    }
     np.savez_compressed(sealed / "truth.npz", **single)
     runs = list(case.setting.runs)
     about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed)}
@@ -138,7 +139,7 @@ def draw_case(
     about |= {"robot": _plain(hidden.robots[0])}
     if manner.background or manner.world != "mujoco":
         about |= {"world": manner.world, "setting": case.setting.as_label()}
-        about |= _measured(hidden, case, worlds | plain)
+        about |= _measured(hidden, case, worlds)
     (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
@@ -237,13 +238,11 @@ def _conceal_tuned(
     runs = len(case.setting.runs)
     plain = replace(NEUTRAL, base=case.base)
     chosen = [run for run in (_REHEARSED if runs >= len(RUNS) else range(runs)) if run < runs]
-    acts = [act(run, plain, case) for run in chosen]
+    acts = {run: act(run, plain, case) for run in range(min(runs, len(RUNS)))}
     wanted = float(np.exp(rng.uniform(*np.log(_BACKGROUND_MM))))
-    amounts = _amounts(
-        background, plain, wanted, Rehearsal(case.manner.world, plain, acts, SECONDS, case.conditions)
-    )
+    amounts = _amounts(background, plain, wanted, acts, case)
     off = background.on(plain, amounts)
-    rehearsal = Rehearsal(case.manner.world, off, acts, SECONDS, case.conditions)
+    rehearsal = Rehearsal(case.manner.world, off, [acts[run] for run in chosen], SECONDS, case.conditions)
     loudness = (runs / len(chosen)) ** 0.5
     things = []
     for effect in effects:
@@ -268,17 +267,22 @@ def _conceal_tuned(
 
 
 def _amounts(
-    background: Background, plain: Concealed, wanted_mm: float, rehearsal: Rehearsal
+    background: Background, plain: Concealed, wanted_mm: float, acts: Mapping[int, Act], case: Case
 ) -> dict[str, float]:
     """Find shares of a background's kinds that together move the robot as far as wanted, each about as far."""
+    rehearsals = {
+        run: Rehearsal(case.manner.world, plain, [one], SECONDS, case.conditions) for run, one in acts.items()
+    }
 
-    def excess(amounts: Mapping[str, float]) -> float:
-        found = rehearsal.size([background.on(plain, amounts)] * rehearsal.count)
-        return max(found["mm_drive"] / wanted_mm, found["deg_drive"] / _BACKGROUND_DEG)
+    def excess(amounts: Mapping[str, float], runs: Iterable[int]) -> float:
+        robot = background.on(plain, amounts)
+        found = [rehearsals[run].size([robot]) for run in runs]
+        return max(max(one["mm_drive"] / wanted_mm, one["deg_drive"] / _BACKGROUND_DEG) for one in found)
 
+    few = [run for run in _REHEARSED if run in acts] or list(acts)
     each = len(background.moving) ** 0.5
-    amounts = {kind: 1.0 / max(excess({kind: 1.0}) * each, 1.0) for kind in background.moving}
-    together = max(excess(amounts), 1.0)
+    amounts = {kind: 1.0 / max(excess({kind: 1.0}, few) * each, 1.0) for kind in background.moving}
+    together = max(excess(amounts, acts), 1.0)
     return {kind: round(amount / together, 6) for kind, amount in amounts.items()}
 
 

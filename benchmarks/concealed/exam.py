@@ -6,7 +6,7 @@ import json
 import secrets
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -22,21 +22,14 @@ _COMPARATOR = (
 
 @dataclass(frozen=True)
 class Terms:
-    """What an examination was begun with; kept in ``exam.json``, so that it goes on as it began."""
+    """What an examination was begun with, counts by world; kept in ``exam.json``, so that it goes on as it began."""
 
     seed: int
-    none: int
-    single: int
-    double: int
-    outside: int
-
-    @property
-    def counts(self) -> Counts:
-        """How many cases of each kind."""
-        return Counts(self.none, self.single, self.double, self.outside)
+    counts: Mapping[str, Counts]
+    background: bool = True
 
 
-def agreed(out: Path, seed: int | None, counts: Counts) -> Terms:
+def agreed(out: Path, seed: int | None, counts: Mapping[str, Counts], *, background: bool = True) -> Terms:
     """Return the terms of the examination in a folder; a new one's are written down.
 
     Parameters
@@ -46,7 +39,9 @@ def agreed(out: Path, seed: int | None, counts: Counts) -> Terms:
     seed
         None: that of the folder, or a fresh one nobody can have tried before.
     counts
-        For a new examination.
+        By world, for a new examination.
+    background
+        Whether robots have a background, in a new examination.
 
     Raises
     ------
@@ -55,12 +50,14 @@ def agreed(out: Path, seed: int | None, counts: Counts) -> Terms:
     """
     path = out / "exam.json"
     if path.exists():
-        known = Terms(**json.loads(path.read_text(encoding="utf-8")))
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        stored["counts"] = {world: Counts(**each) for world, each in stored["counts"].items()}
+        known = Terms(**stored)
         if seed not in {None, known.seed}:
             message = f"{path}: found seed {known.seed}, expected {seed}; take another --out for another examination"
             raise ValueError(message)
         return known
-    terms = Terms(secrets.randbelow(10**9) if seed is None else seed, **asdict(counts))
+    terms = Terms(secrets.randbelow(10**9) if seed is None else seed, counts, background)
     out.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(asdict(terms)) + "\n", encoding="utf-8", newline="\n")
     return terms
@@ -104,7 +101,7 @@ def examine(
         Where tools run, as `run_all`; cases are drawn here.
     """
     until = time.monotonic() + 60.0 * minutes
-    cases = plan(terms.seed, terms.counts)
+    cases = plan(terms.seed, terms.counts, background=terms.background)
     print(f"seed {terms.seed}, manifest {draw_all(cases, out, workers)}", file=sys.stderr)
     names = [case.name for case in cases]
     for tool in tools:

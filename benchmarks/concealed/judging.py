@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.concealed.history import Array
 from benchmarks.concealed.recording import CHANNELS
+from benchmarks.concealed.sizes import is_material
 
 LARGEST_SET = 4  # an `or` of more names than this names nothing
 BIN_S = 0.2  # places in time are compared in steps of so long
@@ -26,7 +27,8 @@ class Judged:
     given. ``d_prime``: per concealed thing. ``hits``: concealed effects named, each by a set of its own. ``covered``:
     for every parameter that could be compared, whether the interval holds the truth. ``gap_closed``: as the verdict
     has it, over the channels with a gap; ``gap_closed_over_all``: over all channels, those of noise alone as well.
-    Entries are nan, or empty, where a verdict does not say.
+    ``world``, ``setting`` and ``sizes`` (per concealed thing, in mm, deg and %): as the label has them. Entries are
+    nan, or empty, where a verdict or a label does not say.
     """
 
     name: str
@@ -41,6 +43,14 @@ class Judged:
     gap_closed_over_all: float = math.nan
     channel_right: bool | None = None
     regime_overlap: float = math.nan
+    world: str = "mujoco"
+    setting: Mapping[str, Any] = field(default_factory=dict)
+    sizes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def material(self) -> bool:
+        """Whether anything concealed matters to somebody who drives a course; not known of the first examinations."""
+        return any(is_material(size) for name, size in self.sizes.items() if name != "background")
 
     @property
     def wrong(self) -> int:
@@ -51,6 +61,16 @@ class Judged:
     def exact(self) -> bool:
         """Whether every concealed effect was named, and nothing else."""
         return self.wrong == 0 and len(self.hits) == len(self.truth)
+
+    @property
+    def half_explained(self) -> bool:
+        """Whether the effects are named, nothing else is, and something is said to be left: right in mixed cases."""
+        return self.wrong == 0 and len(self.hits) == len(self.truth) - 1 and "unexplained" in self.verdict
+
+    @property
+    def right(self) -> bool:
+        """Whether the verdict is what the case's kind asks for."""
+        return {"outside": self.abstained, "mixed": self.half_explained}.get(self.kind, self.exact)
 
     @property
     def abstained(self) -> bool:
@@ -84,7 +104,7 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
     return Judged(
         name=label["case"],
         kind=label["kind"],
-        truth=(outside["id"],) if outside else truth,
+        truth=(*truth, outside["id"]) if outside else truth,
         verdict=str(verdict.get("verdict", "")),
         named=named,
         d_prime=seen["d_prime"],
@@ -94,6 +114,9 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
         gap_closed_over_all=_closed_over_all(holdout),
         channel_right=channel,
         regime_overlap=overlap,
+        world=label.get("world", "mujoco"),
+        setting=label.get("setting", {}),
+        sizes=label.get("size", {}),
     )
 
 

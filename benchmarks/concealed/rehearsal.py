@@ -19,7 +19,8 @@ from benchmarks.concealed.worlds import truth
 _WEAKEST, _STRONGEST = -3.5, 1.0  # shares of the log range within which a strength is sought
 _LOG_RANGE = math.log(12.0)  # of a typical effect, for the first step
 _CLOSE = 0.15  # of the logarithm of d'
-_TRIES = 5
+_TRIES = 6
+_TRACELESS = 1.0  # d' that counts as none
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,6 @@ class Rehearsal:
         self._world, self._absent, self._acts, self._seconds = world, absent, acts, seconds
         self._conditions = conditions
         self._without = [self._driven(absent, act) for act in acts]
-
-    @property
-    def count(self) -> int:
-        """How many acts there are."""
-        return len(self._acts)
 
     def d_prime(self, robots: Sequence[Concealed]) -> float:
         """Give the size of the difference that one robot an act makes, as the best linear detector has it."""
@@ -115,19 +111,29 @@ def tuned(d_prime: Callable[[float], float], target: float) -> float:
     Returns
     -------
     float
-        Of the shares tried, none stronger than the range's upper end, the one that came closest. The secant method:
-        d' is roughly a power of the strength.
+        Of the shares tried, none stronger than the range's upper end, the one that came closest. The secant method,
+        as d' is roughly a power of the strength; halving between a share too weak and one too strong where it is not:
+        a limit that is never reached leaves no trace at all.
     """
     share, slope, tried = 0.5, _LOG_RANGE, dict[float, float]()
     for _ in range(_TRIES):
-        off = math.log(max(d_prime(share), 0.1) / target)
+        off = math.log(max(d_prime(share), _TRACELESS) / target)
         if tried:
             last, off_last = next(reversed(tried.items()))
             slope = min(max((off - off_last) / (share - last), _LOG_RANGE / 4.0), _LOG_RANGE * 4.0)
         tried[share] = off
         if abs(off) < _CLOSE:
             break
-        share = min(max(share - off / slope, _WEAKEST), _STRONGEST)
+        weaker = max((one for one, miss in tried.items() if miss < 0.0), default=_WEAKEST)
+        stronger = min((one for one, miss in tried.items() if miss > 0.0), default=_STRONGEST)
+        share = share - off / slope
+        if not weaker < share < stronger:
+            share = (
+                (weaker + stronger) / 2.0
+                if {weaker, stronger} <= set(tried)
+                else min(max(share, weaker), stronger)
+            )
         if share in tried:
             break
-    return min(tried, key=lambda one: abs(tried[one]))
+    seen = {one: miss for one, miss in tried.items() if miss > math.log(1.5 * _TRACELESS / target)}
+    return min(seen, key=lambda one: abs(seen[one])) if seen else _STRONGEST

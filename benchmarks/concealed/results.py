@@ -24,8 +24,8 @@ WORDS = {
     "no_refit": "`gecar` without refits (screening alone)",
 }
 _COLUMNS = (
-    "tool", "case", "kind", "concealed", "d_prime", "verdict", "said", "right", "channel_right", "regime_overlap",
-    "gap_closed", "intervals_right", "intervals", "cpu_s",
+    "tool", "case", "world", "kind", "concealed", "d_prime", "verdict", "said", "right", "channel_right",
+    "regime_overlap", "gap_closed", "intervals_right", "intervals", "cpu_s",
 )  # fmt: skip
 
 
@@ -66,7 +66,12 @@ def times_taken(journal: Path) -> dict[str, float]:
 
 
 def _about(terms: Terms, times: Mapping[str, float]) -> str:
-    planned = f"{terms.none} nothing, {terms.single} one effect, {terms.double} two, {terms.outside} outside"
+    kinds = {"none": "nothing", "single": "one effect", "double": "two", "triple": "three", "mixed": "mixed"}
+    kinds["outside"] = "outside"
+    planned = "; ".join(
+        f"{world}: " + ", ".join(f"{getattr(each, kind)} {words}" for kind, words in kinds.items())
+        for world, each in terms.counts.items()
+    )
     known = [time for time in times.values() if not math.isnan(time)]
     pace = f"{median(known):.0f} s of processor time a case (median)" if known else "-"
     return (
@@ -125,11 +130,10 @@ def _write_rows(
 
 def _row(one: Judged) -> list[object]:
     said = "; ".join(" or ".join(sorted(names)) for names in one.named)
-    right = one.abstained if one.kind == "outside" else one.exact
     numbers = ["" if math.isnan(n) else round(n, 3) for n in (one.regime_overlap, one.gap_closed)]
     channel = "" if one.channel_right is None else int(one.channel_right)
     loud = round(loudness(one), 1)
     return [
-        one.name, one.kind, " + ".join(one.truth), loud, one.verdict, said, int(right), channel, *numbers,
-        sum(one.covered.values()), len(one.covered),
+        one.name, one.world, one.kind, " + ".join(one.truth), loud, one.verdict, said, int(one.right), channel,
+        *numbers, sum(one.covered.values()), len(one.covered),
     ]  # fmt: skip

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from benchmarks.concealed.cases import broken_seals
+from benchmarks.concealed.cases import KINDS, broken_seals
 from benchmarks.concealed.judging import Judged, judge
 from benchmarks.concealed.plan import read_label
 from benchmarks.concealed.sightings import sight_all
 
 STRONG = 10.0  # d': from here on a single effect has to be named
+PLAIN = 30.0  # d': from here on what matters has to be named, whatever else is small
 
 
 @dataclass(frozen=True)
@@ -84,32 +85,39 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
     list[Figure]
         With 95 % intervals (Wilson) where the figure is a share of cases.
     """
-    of = {
-        kind: [one for one in judged if one.kind == kind] for kind in ("none", "single", "double", "outside")
-    }
+    of = {kind: [one for one in judged if one.kind == kind] for kind in KINDS}
     strong = [one for one in of["single"] if loudness(one) >= STRONG]
-    named = [one for one in of["single"] + of["double"] for _ in one.named]
-    right = sum(len(one.hits) for one in of["single"] + of["double"])
+    plain = [one for one in of["single"] if loudness(one) >= PLAIN and one.material]
+    several = of["double"] + of["triple"]
+    named = [one for one in of["single"] + several for _ in one.named]
+    right = sum(len(one.hits) for one in of["single"] + several)
     found = [one for one in strong if one.hits]
-    return [
+    figures = [
+        _share("single, d' >= 30 and material: named right", [bool(one.hits) for one in plain], ">= 0.95"),
         _share("single, d' >= 10: named right, or in a set", [bool(one.hits) for one in strong], ">= 0.90"),
         _share("the same, and nothing else named", [one.exact for one in strong], ""),
         _share(
             "single, d' < 10: named right", [bool(one.hits) for one in of["single"] if one not in strong], ""
         ),
         _share(
-            "names given, single and double, that are right",
+            "names given, single and several, that are right",
             [True] * right + [False] * (len(named) - right),
             ">= 0.95",
         ),
         _share("nothing concealed: names anything", [bool(one.named) for one in of["none"]], "<= 0.02"),
-        _share("nothing concealed: says unexplained", [one.abstained for one in of["none"]], ""),
+        *(
+            _share(f"nothing concealed: says {word}", [one.verdict == word for one in of["none"]], "")
+            for word in sorted({one.verdict for one in of["none"]})
+        ),
         _share("outside the catalogue: abstains", [one.abstained for one in of["outside"]], ">= 0.90"),
         _share(
             "outside the catalogue: gives a wrong name", [bool(one.named) for one in of["outside"]], "<= 0.05"
         ),
         _share("two at once: exact set", [one.exact for one in of["double"]], ">= 0.80"),
         _share("two at once: at least one right", [bool(one.hits) for one in of["double"]], ""),
+        _share("three at once: exact set", [one.exact for one in of["triple"]], ""),
+        _share("mixed: effect named, rest unexplained", [one.half_explained for one in of["mixed"]], ""),
+        _share("mixed: gives a wrong name", [one.wrong > 0 for one in of["mixed"]], "<= 0.05"),
         _share(
             "95 % intervals cover", [held for one in judged for held in one.covered.values()], "0.92-0.98"
         ),
@@ -119,6 +127,7 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
             [one.gap_closed_over_all for one in found],
             ">= 0.90",
         ),
+        _middle("held-out gap closed, all cases (median)", [one.gap_closed for one in judged], ""),
         _share("located: channel right", [one.channel_right for one in strong + of["outside"]], ">= 0.95"),
         _middle(
             "located: regime overlap (median)",
@@ -126,6 +135,7 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
             ">= 0.7",
         ),
     ]
+    return [figure for figure in figures if figure.count or figure.asked]
 
 
 def loudness(one: Judged) -> float:

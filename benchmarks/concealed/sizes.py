@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def size(pairs: Iterable[tuple[Array, Array]]) -> dict[str, float]:
     return {name: round(value, 3) for name, value in most.items()}
 
 
-def is_material(sizes: dict[str, float]) -> bool:
+def is_material(sizes: Mapping[str, float]) -> bool:
     """Say whether a difference matters to somebody who drives a course."""
     return any(sizes[name] >= least for name, least in MATERIAL.items())
 

@@ -12,12 +12,13 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Picture
 
+from benchmarks.concealed.cases import ALL_OUTSIDE
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.judging import Judged
-from benchmarks.concealed.outside import OUTSIDE
 from benchmarks.concealed.score import Figure, figures, loudness
 
 NOTHING, UNEXPLAINED = "(nothing)", "(unexplained)"
+_LONE = ("none", "single", "outside")
 _BANDS = (0.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0, math.inf)
 
 
@@ -41,6 +42,11 @@ def report(judged: Sequence[Judged], title: str, source: str, sealed: int) -> st
     """
     about = f"{len(judged)} of {sealed} sealed cases have a verdict; manifest {source}"
     parts = [f"# {title}\n\n{about}\n", _figure_table(figures(judged))]
+    worlds = sorted({one.world for one in judged})
+    if len(worlds) > 1:
+        for world in worlds:
+            inside = [one for one in judged if one.world == world]
+            parts += [f"## In the {world} world\n", _figure_table(figures(inside)), _band_table(inside)]
     parts += ["## By loudness\n", _band_table(judged), "## By effect\n", _effect_table(judged)]
     parts += [
         "## Outside the catalogue\n",
@@ -58,7 +64,7 @@ def confusion(judged: Sequence[Judged]) -> dict[str, Counter[str]]:
     Parameters
     ----------
     judged
-        As :func:`benchmarks.concealed.score.score` returns them; doubles are left out.
+        As :func:`benchmarks.concealed.score.score` returns them; cases with several things are left out.
 
     Returns
     -------
@@ -68,7 +74,7 @@ def confusion(judged: Sequence[Judged]) -> dict[str, Counter[str]]:
     """
     said: dict[str, Counter[str]] = defaultdict(Counter)
     for one in judged:
-        if one.kind != "double":
+        if one.kind in _LONE:
             truth = one.truth[0] if one.truth else NOTHING
             said[truth].update(_names(one))
     return said
@@ -85,7 +91,7 @@ def draw(judged: Sequence[Judged], path: Path) -> None:
         Of the PNG file.
     """
     said = confusion(judged)
-    rows = [truth for truth in (*EFFECTS, NOTHING, *OUTSIDE) if truth in said]
+    rows = [truth for truth in (*EFFECTS, NOTHING, *ALL_OUTSIDE) if truth in said]
     columns = [
         name
         for name in (*EFFECTS, NOTHING, UNEXPLAINED)
@@ -144,7 +150,7 @@ def _effect_table(judged: Sequence[Judged]) -> str:
 
 def _outside_table(judged: Sequence[Judged]) -> str:
     text = "| kind | cases | abstains | names something | d' |\n|---|---|---|---|---|\n"
-    for kind in OUTSIDE:
+    for kind in ALL_OUTSIDE:
         cases = [one for one in judged if one.kind == "outside" and one.truth == (kind,)]
         if cases:
             sizes = sorted(loudness(one) for one in cases)
@@ -163,8 +169,7 @@ def _confusion_table(judged: Sequence[Judged]) -> str:
 def _mistakes(judged: Sequence[Judged]) -> str:
     text = "| case | concealed | said | d' |\n|---|---|---|---|\n"
     for one in judged:
-        right = one.abstained if one.kind == "outside" else one.exact
-        if not right:
+        if not one.right:
             said = (
                 "; ".join(" or ".join(sorted(names)) for names in one.named) or one.verdict or "(no verdict)"
             )
