@@ -36,7 +36,11 @@ from gecar.parallel.executors import SerialExecutor
 from gecar.reality import discovery
 
 ROOT = Path(__file__).parents[1]
-SOURCES = sorted((ROOT / "benchmarks" / "concealed").glob("*.py"))
+SOURCES = [
+    path
+    for path in sorted((ROOT / "benchmarks" / "concealed").rglob("*.py"))
+    if path.parent.name != "comparators"
+]
 PRACTICE = ROOT.parent / "shared" / "recordings" / "practice"
 
 
