@@ -60,6 +60,8 @@ class Outcome(NamedTuple):
     wall_s: float
 
 
+FEW = 3  # recordings of which a tool chooses itself what to judge by
+
 _running: dict[subprocess.Popen[bytes], str] = {}
 """Tools this process has started, and for whom."""
 
@@ -149,7 +151,7 @@ def run_all(
 
 
 def holdout_names(case: Path) -> list[str]:
-    """Name the two recordings of a case that are made to judge by.
+    """Name the two recordings of a case that are made to judge by; none where there are too few to spare any.
 
     Parameters
     ----------
@@ -161,7 +163,8 @@ def holdout_names(case: Path) -> list[str]:
     list[str]
         File names.
     """
-    return [path.name for path in sorted(case.glob("run_*.csv"))][-2:]
+    names = [path.name for path in sorted(case.glob("run_*.csv"))]
+    return names[-2:] if len(names) > FEW else []
 
 
 def look(job: Job) -> Outcome:
