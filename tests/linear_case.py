@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from gecar.reality.fitting.parameters import free
+from gecar.reality.materiality import Size
 from gecar.reality.recordings.recording import make_recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.thresholds import MOTION
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")
@@ -34,6 +34,9 @@ class LinearResiduals:
     @property
     def recordings(self) -> tuple[Any, ...]:
         return tuple(SimpleNamespace(recording=RUN) for _ in range(self.count))
+
+    def gyro_errors(self) -> np.ndarray:
+        return np.zeros((len(self.noise), 2))
 
     @property
     def clock_offsets_s(self) -> np.ndarray:
@@ -62,6 +65,24 @@ class LinearResiduals:
         return out
 
 
+@dataclass(frozen=True)
+class LinearSizes:
+    """A standard deviation of the noise is a centimetre."""
+
+    residuals: LinearResiduals
+
+    def of(self, residuals: LinearResiduals) -> LinearSizes:
+        return LinearSizes(residuals)
+
+    def apart(self, one: np.ndarray, other: np.ndarray) -> Size:
+        change = self.residuals.errors(one) - self.residuals.errors(other)
+        return Size(mm_1m=10.0 * float(np.sqrt(np.mean(change**2))))
+
+    def left(self, physics: np.ndarray) -> Size:
+        beyond = np.mean(self.residuals.errors(physics) ** 2) - 1.0
+        return Size(mm_1m=10.0 * float(np.sqrt(max(beyond, 0.0))))
+
+
 def bumps(seed: int, count: int, size: float) -> np.ndarray:
     """Return a smooth response: random values every half second, filled straight."""
     rng = np.random.default_rng(seed)
@@ -78,4 +99,5 @@ def linear(
 
 
 def linear_problem(residuals: LinearResiduals) -> Problem:
-    return problem_of(residuals, EV3, tuple(residuals.responses), MOTION)  # type: ignore[arg-type]
+    problem = problem_of(residuals, EV3, tuple(residuals.responses))  # type: ignore[arg-type]
+    return replace(problem, sizes=LinearSizes(residuals))  # type: ignore[arg-type]

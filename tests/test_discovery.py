@@ -27,6 +27,7 @@ from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import NAMES, Formula, describe
+from gecar.reality.materiality import Size
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.prove.whiteness import whiteness
@@ -152,7 +153,13 @@ def test_a_bench_needs_no_camera() -> None:
 
 def test_the_verdicts_json_keeps_the_contract() -> None:
     table = verdict_on("actuation_delay", "time_s", 0.03).as_json()
-    assert set(table) == {"verdict", "effects", "located", "holdout", "residual", "next_recording"}
+    assert set(table) == {
+        "verdict", "effects", "minor", "limits", "located", "holdout", "residual", "next_recording"
+    }  # fmt: skip
+    assert set(table["residual"]) == {"white", "p", "formula", "material", "size"}
+    assert set(table["residual"]["size"]) >= {"mm", "deg", "arrival_s"}
+    assert set(table["limits"]) == {effect.id for effect in CATALOGUE} - {"actuation_delay"}
+    assert set(table["limits"]["backlash"]) == {"size", "unit"}
     assert set(table["effects"][0]) == {"id", "or", "parameters", "evidence"}
     assert set(table["effects"][0]["evidence"]) == {"holdout_gain", "null_95", "p"}
     assert set(table["holdout"]) == {"recordings", "channels", "before", "after", "floor", "gap_closed"}
@@ -254,7 +261,9 @@ def test_a_formula_is_found_on_one_fitted_recording_alone_and_none_in_noise() ->
 def test_a_formula_that_harms_a_channel_says_so() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     described = {"x_m": Misfit(0.1, 0.05, 0.01), "y_m": Misfit(0.1, 0.2, 0.01)}
-    harmed = replace(verdict, verdict="unexplained", residual=Residual(False, 0.01, "x", described))
+    harmed = replace(
+        verdict, verdict="unexplained", residual=Residual(False, 0.01, Size(), True, "x", described)
+    )
     assert "x_m 0.1000 to 0.0500, y_m 0.1000 to 0.2000 (worse)" in str(harmed)
 
 

@@ -9,6 +9,7 @@ import pytest
 from test_discovery import EV3, recorded
 
 from gecar.reality.advise.next_recording import LIBRARY, difference, suggest
+from gecar.reality.materiality import Size
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.verdict import Found
@@ -39,7 +40,7 @@ def parted(like: Recording, one: Robot = LATE, other: Robot = LAGGING) -> dict[s
 
 
 def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
-    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01),)
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
     suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False)
     differences = parted(LIKE)
     best = max(differences, key=lambda name: differences[name])
@@ -49,7 +50,7 @@ def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
 
 
 def test_where_no_sequence_tells_two_robots_apart_that_is_said() -> None:
-    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01),)
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
     suggested = suggest(LATE, found, [LAGGING], seen_on("none"), NOISE, unexplained=False)
     assert "no sequence of the library tells" in suggested.why
 

@@ -133,13 +133,14 @@ def test_a_twentieth_of_a_loud_case_is_not_left_without_a_word() -> None:
     loud = replace(loud, noise=loud.noise + unlike(RESPONSES[VISCOUS], 9, 1.8))
     explained = explain(linear_problem(loud))
     assert [step.effect for step in explained.steps] == [VISCOUS]
-    assert 0.03 < explained.left.excess_energy / explained.problem.known.excess_energy < 0.1
+    before = explained.problem.sizes.left(explained.problem.known.physics)
+    assert 0.03 < (explained.left.mm_1m / before.mm_1m) ** 2 < 0.1
     assert explained.unexplained
 
 
 def test_effects_with_the_same_response_are_alternatives() -> None:
     twins = {VISCOUS: RESPONSES[VISCOUS], INERTIA: RESPONSES[VISCOUS] + 0.02 * RESPONSES[TRACK]}
-    explained = explain(linear_problem(linear({VISCOUS: 3.0}, twins)))
+    explained = explain(linear_problem(linear({VISCOUS: 5.0}, twins)))
     step = explained.steps[0]
     assert {step.effect, *alternatives(explained, step)} == {VISCOUS, INERTIA}
 
@@ -151,7 +152,7 @@ def test_alternatives_come_from_the_stage_an_effect_was_taken_at() -> None:
         TRACK: bumps(3, 4, 1.0),
         INERTIA: bumps(3, 4, 1.0) + 0.02 * bumps(7, 4, 1.0),
     }
-    explained = explain(linear_problem(linear({VISCOUS: 6.0, TRACK: 3.0}, twins)))
+    explained = explain(linear_problem(linear({VISCOUS: 9.0, TRACK: 6.0}, twins)))
     second = explained.steps[1]
     rest = explained.problem.estimator.fit((second.effect,), explained.taken.values)
     dropped = replace(explained, steps=(second,), taken=rest)
@@ -163,14 +164,16 @@ def test_alternatives_come_from_the_stage_an_effect_was_taken_at() -> None:
 def test_an_effect_swapped_in_is_judged_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = linear_problem(linear({VISCOUS: 4.0, TRACK: 4.0}, RESPONSES))
     estimator, seen = problem.estimator, list[str]()
-    wrong = estimator.fit((INERTIA, TRACK), {})
+    wrong = estimator.fit((TRACK, INERTIA), {})
     start = estimator.fit((TRACK,), {})
     inertia = stepwise.Step(INERTIA, start, wrong, start.cost - wrong.cost, null_95=7.0, p=0.001)
     track = stepwise.Step(TRACK, problem.known, start, problem.known.cost - start.cost, null_95=7.0, p=0.002)
     right = estimator.fit((VISCOUS,), {})
     viscous = stepwise.Step(VISCOUS, problem.known, right, problem.known.cost - right.cost)
     monkeypatch.setattr(stepwise, "judged", lambda p, s: seen.append(s.effect) or judged(p, s))
-    taken, steps = stepwise._swapped_and_dropped(problem, [track, inertia], [[track, viscous], [inertia]])
+    tried = ((track, viscous), (inertia,))
+    chain = stepwise._Chain((track, inertia), wrong, tried)
+    taken, steps = stepwise._swapped_and_dropped(problem, chain, tried)
     assert set(taken.effects) == {TRACK, VISCOUS}
     assert VISCOUS in seen
     found = next(step for step in steps if step.effect == VISCOUS)
@@ -239,5 +242,5 @@ def test_taking_an_effect_out_restores_the_known_robot_s_value() -> None:
 
 def test_every_threshold_says_what_it_means_and_where_it_comes_from() -> None:
     rows = table()
-    assert 20 < len(rows) < 30
+    assert 10 < len(rows) < 30
     assert all(value.meaning and value.source for _, value in rows)

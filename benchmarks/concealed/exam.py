@@ -14,7 +14,7 @@ from benchmarks.concealed.plan import Counts, draw_all, plan
 from benchmarks.concealed.runner import DISCOVER, run_all
 
 GECAR = "gecar"
-COMPARATORS = ("bic", "everything", "sparse", "no_whitening", "no_null", "no_refit")
+COMPARATORS = ("bic", "everything", "sparse", "no_discrepancy", "no_whitening", "no_null", "no_refit")
 _COMPARATOR = (
     "{{python}} -m benchmarks.concealed.comparators {name} {{case}} --out {{out}} --holdout {{holdout}}"
 )

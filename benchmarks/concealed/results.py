@@ -19,6 +19,7 @@ WORDS = {
     "bic": "forward selection by BIC",
     "everything": "all effects fitted at once",
     "sparse": "sparse regression on differentiated residuals (SINDy)",
+    "no_discrepancy": "`gecar` without model discrepancy",
     "no_whitening": "`gecar` without whitening",
     "no_null": "`gecar` without the null",
     "no_refit": "`gecar` without refits (screening alone)",

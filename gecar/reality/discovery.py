@@ -13,16 +13,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import notes_on
 from gecar.reality.evidence import Evidence
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
+from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
-from gecar.reality.locate.hotspot import hotspot
+from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
+from gecar.reality.materiality import DEFAULT, Material, Size, largest
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
 from gecar.reality.prove.holdout import Contender, judge
@@ -33,15 +36,19 @@ from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.acceptance import size_of
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
-from gecar.reality.selection.problem import problem_of
+from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, explain
-from gecar.reality.selection.thresholds import MOTION, SENSOR, SENSOR_ON_A_DOUBTFUL_PATH, SIGNIFICANCE
+from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
-from gecar.reality.verdict import Found, Interval, Judgement, Misfit, Residual, Verdict
+from gecar.reality.uncertainty.limits import limits
+from gecar.reality.verdict import Found, Interval, Judgement, Limit, Minor, Misfit, Residual, Verdict
+from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE, Effect
 from gecar.world.robot import Robot
+from gecar.world.rollout import Outcome, World, simulate
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 
@@ -56,6 +63,18 @@ class _Context:
     seed: int
     tell: Callable[[str], None]
     with_formula: bool
+    material: Material
+    program: Program | None
+
+    def arrival_apart_s(self, one: Robot, other: Robot) -> float | None:
+        """Return how much later or earlier one robot arrives with the program than another [s]; None: unknown."""
+        course = self.split.fitted[0].setup.course
+        if self.program is None or course == "none":
+            return None
+        floor = load_course(course)
+        drives = [simulate(World(robot, floor), self.program.opcodes) for robot in (one, other)]
+        arrived = all(drive.outcome is Outcome.GOAL for drive in drives)
+        return abs(drives[0].time_s - drives[1].time_s) if arrived else None
 
 
 def discover(
@@ -67,6 +86,8 @@ def discover(
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
     with_formula: bool = False,
     catalogue: Sequence[Effect] = CATALOGUE,
+    material: Material = DEFAULT,
+    program: Program | None = None,
 ) -> Verdict:
     """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
 
@@ -88,6 +109,10 @@ def discover(
         Whether to add a formula for what nothing explains to the replays, and to judge what that gains.
     catalogue
         The effects that may be found.
+    material
+        From what size on something is material.
+    program
+        Whose time of arrival tells sizes, too.
 
     Raises
     ------
@@ -95,7 +120,9 @@ def discover(
         If a name is unknown, or a robot or course file is wrong.
     """
     known = robot if robot is not None else known_robot(case.recordings[0])
-    context = _Context(known, tuple(catalogue), hold_out(case, holdout), seed, tell, with_formula)
+    context = _Context(
+        known, tuple(catalogue), hold_out(case, holdout), seed, tell, with_formula, material, program
+    )
     with Threads(workers) as threads:
         return _discover(case.name, context, threads)
 
@@ -117,7 +144,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         Contender(robot, _with_nuisances(held, motion.explained, robot.physics)) for robot in (known, found)
     )
     context.tell("alternatives, location")
-    effects, rivals = _findings(known, stages)
+    effects, rivals = _findings(context, stages)
     unexplained = any(stage.explained.unexplained for stage in stages)
     word = _word(bool(effects), unexplained)
     where = _located(context, stages, fitted, found)
@@ -125,11 +152,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         case=name,
         verdict=word,
         effects=effects,
+        minor=tuple(_minor(context, stage, step) for stage in stages for step in stage.explained.minor),
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
         residual=_what_is_left(context, stages, fitted, after),
         next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
         robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
+        limits=_limits(context, stages),
         fitted_on=tuple(r.name for r in split.fitted),
         notes=notes_on(
             split,
@@ -152,15 +181,14 @@ class _Stage(Confirmation):
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
-    """Explain how the robot moved; what is left at one place of the floor counts where nothing else is."""
+    """Explain how the robot moved; where nothing does, what is left may be at one place of the floor."""
     catalogue = observable(context.catalogue, fitted)
-    problem = problem_of(fitted, context.robot, catalogue, MOTION, context.seed, context.tell)
+    problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
     motion = _with_intervals(context, confirmed(explain(problem), held))
     explained = motion.explained
-    if explained.unexplained or explained.steps:
+    if explained.steps:
         return motion
-    spot = hotspot(explained.problem, explained.left)
-    return replace(motion, explained=replace(explained, unexplained=spot is not None, spot=spot))
+    return replace(motion, explained=with_spot(explained))
 
 
 def _explain_sensor(
@@ -172,9 +200,8 @@ def _explain_sensor(
         return None
     # A late camera and a skewed clock shift what is read, too.
     known = context.robot.with_effects(motion.taken.values)
-    limits = SENSOR_ON_A_DOUBTFUL_PATH if motion.unexplained else SENSOR
     catalogue = observable(context.catalogue, residuals)
-    problem = problem_of(residuals, known, catalogue, limits, context.seed, context.tell)
+    problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell)
     seen = confirmed(explain(problem), _with_nuisances(held, motion, motion.taken.physics).of_sensor())
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     return _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
@@ -188,7 +215,9 @@ def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[A
 
 def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
     """Return recordings with the path their colour sensor took, as a robot's physics gives it."""
-    inflation = motion.problem.estimator.blocks.inflation(motion.left.errors)[list(POSE)]
+    problem = motion.problem
+    errors = problem.residuals.errors(problem.with_small_changes(motion.taken))
+    inflation = problem.estimator.blocks.inflation(errors)[list(POSE)]
     return residuals.localised(physics).with_paths(physics, inflation)
 
 
@@ -200,13 +229,17 @@ def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
         absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
         if not absent:
+            if explained.minor:
+                small = intervals(explained.problem.estimator, explained.whole, context.seed)
+                spans = {**small, **spans}
             return _Stage(explained, candidates, spans)
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
 
 
-def _findings(known: Robot, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
+def _findings(context: _Context, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
     """Return what was found, and robots with an alternative in its place."""
+    known = context.robot
     found, rivals = list[Found](), list[Robot]()
     for stage in stages:
         beside = {
@@ -219,8 +252,32 @@ def _findings(known: Robot, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...]
             others = alternatives(stage.explained, step)
             rivals += [known.with_effects({**beside, **model.values}) for model in others.values()]
             gain, null = step.holdout_gain, step.null_95
-            found.append(Found(step.effect, tuple(others), stage.spans[step.effect], gain, null, step.p))
+            size = _sized(context, stage.explained.problem, stage.explained.taken, step)
+            found.append(
+                Found(step.effect, tuple(others), stage.spans[step.effect], gain, null, step.p, size)
+            )
     return tuple(found), tuple(rivals)
+
+
+def _minor(context: _Context, stage: _Stage, step: Step) -> Minor:
+    size = _sized(context, stage.explained.problem, stage.explained.whole, step)
+    return Minor(step.effect, stage.spans[step.effect], size)
+
+
+def _sized(context: _Context, problem: Problem, model: Model, step: Step) -> Size:
+    """Return what an effect of a model does to the robot, and to when it arrives."""
+    values = model.values
+    known, whole = context.robot, context.robot.with_effects(values)
+    rest = known.with_effects({effect: v for effect, v in values.items() if effect != step.effect})
+    size = size_of(problem, model, step)
+    return replace(size, arrival_s=context.arrival_apart_s(whole, rest))
+
+
+def _limits(context: _Context, stages: Sequence[_Stage]) -> dict[str, Limit | None]:
+    """Return, of every effect that was not found, the smallest size that these recordings would have shown."""
+    seen = {e: each for s in stages for e, each in limits(s.explained.problem, s.explained.taken).items()}
+    found = {step.effect for stage in stages for step in stage.explained.steps}
+    return {effect.id: seen.get(effect.id) for effect in context.catalogue if effect.id not in found}
 
 
 def _located(context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Robot) -> MismatchMap:
@@ -229,7 +286,7 @@ def _located(context: _Context, stages: Sequence[_Stage], fitted: Residuals, fou
     sensor_unexplained = any(stage.explained.unexplained for stage in stages[1:])
     return MismatchMap(
         fitted.recordings,
-        motion.problem.known.errors,
+        motion.problem.residuals.errors(context.robot.physics),
         motion.problem.residuals.index,
         context.robot.physics,
         motion.taken.physics,
@@ -252,7 +309,13 @@ def _what_is_left(
         described = describe(fitted.recordings, motion.taken.physics, context.seed)
     gained = _with_formulas(found, described) if context.with_formula and described else None
     white = p > SIGNIFICANCE and not any(each.unexplained for each in parts)
-    return Residual(white, p, "; ".join(map(str, described)) or None, gained)
+    apart = (
+        context.robot.with_effects(v)
+        for v in (motion.taken.values, motion.problem.small_changes(motion.taken))
+    )
+    size = replace(largest([each.left for each in parts]), arrival_s=context.arrival_apart_s(*apart))
+    material = any(each.unexplained for each in parts)
+    return Residual(white, p, size, material, "; ".join(map(str, described)) or None, gained)
 
 
 def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, Misfit]:

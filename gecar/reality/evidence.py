@@ -41,10 +41,14 @@ class Evidence:
 
 
 def _summary(name: str, explained: Explanation) -> str:
-    blocks = max(explained.problem.blocks, 1)
     tried = [
-        f"{s.effect}{'' if s.worthwhile else '-'} {s.gain:.0f}/{s.model.excess_energy / blocks:.2f}"
+        f"{s.effect}{'' if s.worthwhile else '-'} {s.gain:.0f}"
         for s in (explained.tried[-1][:3] if explained.tried else ())
     ]
-    before, after = explained.problem.known.excess_energy / blocks, explained.taken.excess_energy / blocks
-    return f"{name} {before:.2f} -> {after:.2f} last tried: {', '.join(tried)}"
+    size = explained.left
+    left = (
+        f"{size.mm_1m:.1f} mm {size.deg_1m:.2f} deg a metre"
+        if not size.reading_pct
+        else f"{size.reading_pct:.1f} %"
+    )
+    return f"{name}: left {left}; last tried: {', '.join(tried)}"

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gecar.errors import expected
+from gecar.reality.materiality import Size
 from gecar.world.robot import Robot
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ class Found:
         What it lowers the cost by on the recordings set aside.
     null_95, p
         95 % quantile of the largest gain without a cause, and the share of nulls that gain as much.
+    size
+        What it does to the robot.
     """
 
     id: str
@@ -59,6 +62,34 @@ class Found:
     holdout_gain: float
     null_95: float
     p: float
+    size: Size
+
+
+@dataclass(frozen=True)
+class Minor:
+    """An effect that is visible and too small to matter: what there is could be it.
+
+    Attributes
+    ----------
+    id
+        Its identifier.
+    parameters
+        By label.
+    size
+        What it does to the robot.
+    """
+
+    id: str
+    parameters: Mapping[str, Interval]
+    size: Size
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The smallest size of an effect that would have been seen: a change from neutral, or a limit's or rate's value."""
+
+    size: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -133,6 +164,8 @@ class Residual:
     ----------
     white, p
         Whether it is white, and how likely that is by chance.
+    size, material
+        How far the robot found, its constants fitted, parts from the recordings it was fitted to; whether that matters.
     formula
         What describes it, the most telling first.
     described
@@ -141,6 +174,8 @@ class Residual:
 
     white: bool
     p: float
+    size: Size
+    material: bool
     formula: str | None = None
     described: Mapping[str, Misfit] | None = None
 
@@ -165,13 +200,16 @@ class Verdict:
     residual: Residual
     next_recording: NextRecording
     robot: Robot
+    minor: tuple[Minor, ...] = ()
+    limits: Mapping[str, Limit | None] = field(default_factory=dict)
     fitted_on: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     evidence: Any = field(default=None, repr=False)
 
     def __str__(self) -> str:
         """Return the verdict in words."""
-        return "\n\n".join(_above("report.verdict").sentences(self))
+        words = _above("report.verdict")
+        return "\n\n".join([*words.sentences(self), *words.limits(self)])
 
     def _repr_html_(self) -> str:
         """Return the verdict as a notebook shows it: words, tables, and how much of the gap is closed."""
@@ -198,6 +236,7 @@ class Verdict:
         return {
             "verdict": self.verdict,
             "effects": [_effect_json(found) for found in self.effects],
+            "minor": [_minor_json(minor) for minor in self.minor],
             "located": [_place_json(place) for place in self.located],
             "holdout": {
                 "recordings": list(judged.recordings),
@@ -207,6 +246,7 @@ class Verdict:
                 "floor": judged.floor,
                 "gap_closed": None if self.verdict == "nothing" else judged.gap_closed,
             },
+            "limits": {effect: limit and vars(limit) for effect, limit in self.limits.items()},
             "residual": _residual_json(self.residual),
             "next_recording": {
                 "why": self.next_recording.why,
@@ -224,6 +264,23 @@ def _effect_json(found: Found) -> dict[str, Any]:
     }
 
 
+def _minor_json(minor: Minor) -> dict[str, Any]:
+    parameters = {label: vars(interval) for label, interval in minor.parameters.items()}
+    return {"id": minor.id, "parameters": parameters, "moves": size_json(minor.size)}
+
+
+def size_json(size: Size) -> dict[str, float | None]:
+    """Return a size as it is written: over a whole recording, and over a metre."""
+    return {
+        "mm": size.mm_drive,
+        "deg": size.deg_drive,
+        "arrival_s": size.arrival_s,
+        "mm_1m": size.mm_1m,
+        "deg_1m": size.deg_1m,
+        "reading_pct": size.reading_pct,
+    }
+
+
 def _above(module: str) -> Any:
     """Return a module of the rooms that make words and pictures: no import, for this room must not need them."""
     return import_module(f"gecar.{module}")
@@ -231,6 +288,7 @@ def _above(module: str) -> Any:
 
 def _residual_json(residual: Residual) -> dict[str, Any]:
     table: dict[str, Any] = {"white": residual.white, "p": residual.p, "formula": residual.formula}
+    table |= {"material": residual.material, "size": size_json(residual.size)}
     if residual.described is not None:
         table["with_formula"] = {c: vars(m) for c, m in residual.described.items()}
     return table

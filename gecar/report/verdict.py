@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from gecar.reality.verdict import Found, Interval, Misfit, Place, Verdict
+import math
+
+from gecar.reality.materiality import Size
+from gecar.reality.verdict import Found, Interval, Limit, Misfit, Place, Verdict
 from gecar.world.effects import BY_ID
 
 CHANNEL_WORDS = {
@@ -16,10 +19,15 @@ def sentences(verdict: Verdict) -> list[str]:
     """Say a verdict, a sentence or two a paragraph."""
     out = [_headline(verdict)]
     out += [_effect(found) for found in verdict.effects]
+    if verdict.minor:
+        named = "; ".join(
+            f"{BY_ID[m.id].title} ({m.id}), which moves the robot by {_moves(m.size)}" for m in verdict.minor
+        )
+        out.append(f"Visible, and too small to matter; it could be: {named}.")
     if verdict.effects:
         out.append(_proof(verdict))
-    if verdict.verdict == "missing" and not verdict.residual.white:
-        out.append("What is left is more than noise, but little beside what was found.")
+    if verdict.verdict == "missing":
+        out.append(f"What is left moves the robot by {_moves(verdict.residual.size)}, which does not matter.")
     if verdict.verdict.endswith("unexplained"):
         out.append(_unexplained(verdict))
     if verdict.located:
@@ -34,7 +42,7 @@ def sentences(verdict: Verdict) -> list[str]:
 def _headline(verdict: Verdict) -> str:
     names = " and ".join(BY_ID[f.id].title for f in verdict.effects)
     return {
-        "nothing": "Nothing is missing: the simulation follows these recordings down to the sensors' noise.",
+        "nothing": _nothing(verdict),
         "missing": f"Missing in the simulation: {names}.",
         "unexplained": "Something is missing, and nothing in the catalogue explains it.",
         "missing_and_unexplained": (
@@ -43,11 +51,53 @@ def _headline(verdict: Verdict) -> str:
     }[verdict.verdict]
 
 
+def _nothing(verdict: Verdict) -> str:
+    left = verdict.residual
+    if left.white:
+        return "Nothing is missing: the simulation follows these recordings down to the sensors' noise."
+    return f"Nothing material is missing: what is left moves the robot by {_moves(left.size)}, and does not matter."
+
+
+def _moves(size: Size) -> str:
+    """Say a size."""
+    words = []
+    if size.mm_1m or size.deg_1m:
+        words.append(
+            f"{size.mm_1m:.1f} mm and {size.deg_1m:.1f} degrees over a metre ({size.mm_drive:.0f} mm and "
+            f"{size.deg_drive:.1f} degrees over a whole recording)"
+        )
+    if size.reading_pct:
+        words.append(f"{size.reading_pct:.1f} % of a reading")
+    if size.arrival_s is not None:
+        words.append(f"{size.arrival_s:.2f} s of arrival")
+    return " and ".join(words) or "nothing that can be measured"
+
+
+def limits(verdict: Verdict) -> list[str]:
+    """Say which sizes would have been seen, and of what nothing is known, a sentence each."""
+    seen = [f"{e} {_above_limit(e, each)}" for e, each in verdict.limits.items() if each]
+    unseen = [e for e, each in verdict.limits.items() if not each]
+    out = []
+    if seen:
+        out.append(f"Not found, and seen in 95 of 100 cases if there: {', '.join(seen)}.")
+    if unseen:
+        out.append(f"Of these these recordings say nothing: {', '.join(unseen)}.")
+    return out
+
+
+def _above_limit(effect: str, limit: Limit) -> str:
+    """Say from what size on an effect shows; a limit or rate vanishes at infinity and shows below."""
+    unit = "" if limit.unit == "-" else f" {limit.unit}"
+    side = "below" if math.isinf(BY_ID[effect].parameters[0].neutral or 0.0) else "from"
+    return f"{side} {limit.size:.2g}{unit}"
+
+
 def _effect(found: Found) -> str:
     effect = BY_ID[found.id]
     sizes = ", ".join(f"{label} {_interval(i)}" for label, i in found.parameters.items())
     words = (
-        f"{effect.title[0].upper()}{effect.title[1:]} ({effect.id}): {sizes}. It shows in {effect.signature}."
+        f"{effect.title[0].upper()}{effect.title[1:]} ({effect.id}): {sizes}. It shows in {effect.signature}. "
+        f"It moves the robot by {_moves(found.size)}."
     )
     if found.alternatives:
         words += f" These recordings can not tell it from {' or '.join(found.alternatives)}."
@@ -77,7 +127,7 @@ def _proof(verdict: Verdict) -> str:
 
 def _unexplained(verdict: Verdict) -> str:
     shown = verdict.located[0] if verdict.located else None
-    words = "No effect in the catalogue explains what is left."
+    words = f"No effect in the catalogue explains what is left: it moves the robot by {_moves(verdict.residual.size)}."
     if shown is not None:
         words += f" It shows most in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
     if verdict.residual.formula:

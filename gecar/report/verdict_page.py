@@ -7,7 +7,7 @@ import html
 from collections.abc import Mapping
 
 from gecar.reality.verdict import Verdict
-from gecar.report.verdict import sentences
+from gecar.report.verdict import limits, sentences
 from gecar.world.effects import BY_ID
 
 _STYLE = """
@@ -49,6 +49,7 @@ def verdict_html(verdict: Verdict, pictures: Mapping[str, bytes]) -> str:
         _effects(verdict),
         _channels(verdict),
         _places(verdict),
+        _limits(verdict),
         *(_picture(name, png) for name, png in pictures.items()),
         f"<p>Fitted on {_text(', '.join(verdict.fitted_on))}.</p>",
     ]
@@ -80,7 +81,14 @@ def _effects(verdict: Verdict) -> str:
         for f in verdict.effects
         for label, i in f.parameters.items()
     ]
-    return _table("What is missing", ["effect", "parameter", "value", "95 %", "unit", "or"], rows)
+    minor = [
+        [BY_ID[m.id].title, label, f"{i.value:.4g}", f"{i.low:.4g} to {i.high:.4g}", i.unit]
+        for m in verdict.minor
+        for label, i in m.parameters.items()
+    ]
+    heads = ["effect", "parameter", "value", "95 %", "unit", "or"]
+    small = _table("Visible, and too small to matter", heads[:5], minor)
+    return _table("What is missing", heads, rows) + small
 
 
 def _channels(verdict: Verdict) -> str:
@@ -102,6 +110,16 @@ def _places(verdict: Verdict) -> str:
         for p in verdict.located
     ]
     return _table("Where it shows", ["channel", "motion", "share", "p", "recording", "times [s]"], rows)
+
+
+def _limits(verdict: Verdict) -> str:
+    """Return what could have been seen, folded away."""
+    lines = "".join(f"<p>{_text(line)}</p>" for line in limits(verdict))
+    return (
+        f"<details><summary>What these recordings could have shown</summary>{lines}</details>"
+        if lines
+        else ""
+    )
 
 
 def _picture(name: str, png: bytes) -> str:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from gecar.reality import discovery
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import initial_values
-from gecar.reality.fitting.model import NOTHING_TOLERATED, Effects, Model, Step
+from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import cost
@@ -26,7 +26,6 @@ from gecar.reality.residuals import of_case
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.selection import cross_validation, stepwise
 from gecar.reality.selection.acceptance import is_worthwhile
-from gecar.reality.selection.model_tolerance import without_tolerated
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import MOST_EFFECTS
@@ -60,8 +59,10 @@ def by_bic(problem: Problem) -> Explanation:
 def _explanation(
     problem: Problem, model: Model, steps: Sequence[Step], tried: Sequence[tuple[Step, ...]]
 ) -> Explanation:
-    left = without_tolerated(problem, model)
-    return Explanation(problem, model, left, tuple(steps), tuple(tried), unexplained=False)
+    left = problem.sizes.left(model.physics)
+    return Explanation(
+        problem, model, tuple(steps), tuple(tried), left, unexplained=False, minor=(), whole=model
+    )
 
 
 def _bic(model: Model) -> float:
@@ -136,10 +137,9 @@ def one_iteration(
     effects: Sequence[str],
     values: Effects,
     rounds: int = 1,
-    tolerated: Array = NOTHING_TOLERATED,
 ) -> Model:
     """Take one step along the sensitivities, however many rounds are asked for."""
-    return _fit(estimator, effects, values, min(rounds, 1), tolerated)
+    return _fit(estimator, effects, values, min(rounds, 1))
 
 
 def as_it_is(estimator: Estimator, model: Model, spread: float = 0.0) -> Model:  # noqa: ARG001
@@ -176,12 +176,18 @@ def _white(blocks: Blocks, errors: Array) -> Array:  # noqa: ARG001
     return np.ones(len(CHANNELS))
 
 
-_NO_HOTSPOT = (discovery, "hotspot", lambda *_: None)
+def without_discrepancy(problem: Problem, *_: object) -> Problem:
+    """Take the simulation for exact: only the sensors' noise counts."""
+    return problem
+
+
+_NO_HOTSPOT = (discovery, "with_spot", lambda explained: explained)
 # By name: what stands in for which part, and where that part is.
 METHODS: dict[str, tuple[tuple[Any, str, object], ...]] = {
     "bic": ((discovery, "explain", by_bic), _NO_HOTSPOT),
     "everything": ((discovery, "explain", everything), _NO_HOTSPOT),
     "no_whitening": ((of_case, "residuals_of", open_loop_residuals_of), (Blocks, "inflation", _white)),
+    "no_discrepancy": ((Problem, "under", without_discrepancy),),
     "no_null": ((stepwise, "judged", without_null),),
     "no_refit": (
         (stepwise, "candidate_steps", by_sensitivities),

@@ -17,11 +17,13 @@ import typer
 from gecar.cli.output import Output, plain
 from gecar.errors import InputError
 from gecar.files import write_whole
+from gecar.language.program import Program
 from gecar.parallel.run_parallel import Workplace, perform_each
 from gecar.reality.discovery import discover
+from gecar.reality.materiality import Material
 from gecar.reality.recordings.recording import Case
 from gecar.reality.verdict import Verdict
-from gecar.report.verdict import sentences
+from gecar.report.verdict import limits, sentences
 from gecar.world.robot import Robot, write_robot
 
 
@@ -33,7 +35,7 @@ class Task:
     ----------
     case
         The recordings.
-    holdout, robot, seed, workers, with_formula
+    holdout, robot, seed, workers, with_formula, material, program
         As `gecar.reality.discovery.discover`.
     pictures
         Whether to draw.
@@ -46,6 +48,8 @@ class Task:
     workers: int | None
     with_formula: bool
     pictures: bool
+    material: Material
+    program: Program | None
 
 
 class Told(NamedTuple):
@@ -68,7 +72,10 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     InputError
         As `gecar.reality.discovery.discover`.
     """
-    verdict = discover(task.case, task.holdout, task.robot, task.seed, task.workers, tell, task.with_formula)
+    verdict = discover(
+        task.case, task.holdout, task.robot, task.seed, task.workers, tell, task.with_formula,
+        material=task.material, program=task.program,
+    )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     table = plain(verdict.as_json())
     write_whole(out / "verdict.json", json.dumps(table, indent=1, allow_nan=False) + "\n")
@@ -76,7 +83,7 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     if task.pictures:
         tell("pictures")
         _draw(verdict, out)
-    return Told(sentences(verdict), table, {})
+    return Told([*sentences(verdict), *limits(verdict)], table, {})
 
 
 def conclude_away(task: Task, tell: Callable[[str], None] = _keep_still) -> Told:

@@ -51,6 +51,16 @@ def discover(
         typer.Option("--with-formula", show_default=False,
                      help="Add a formula for what nothing explains to the replays, and show what it gains."),
     ] = False,
+    material: Annotated[
+        float,
+        typer.Option("--material", metavar="MM",
+                     help="From how many millimetres over a metre on something matters (and degrees: a fifth of it)."),
+    ] = 5.0,
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", metavar="FILE", show_default=False,
+                     help="A program, or a run's folder, whose time of arrival shows what sizes mean."),
+    ] = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
@@ -60,14 +70,20 @@ def discover(
 
       gecar discover recordings/monday --out verdicts/monday
       gecar discover recordings/monday --holdout run_07,run_08 --json
+      gecar discover recordings/monday --material 2 --program runs/evolve-001
       gecar discover recordings/* --out verdicts --executor process
       gecar evolve --robot verdicts/monday/robot.toml
     """
     from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller
+    from gecar.cli.inputs import find_program
+    from gecar.language.program import read_program
     from gecar.parallel.executors import usable_cores
+    from gecar.reality.materiality import Material
     from gecar.reality.recordings.recording import read_case
     from gecar.world.robot import load_robot
 
+    if not material > 0.0:
+        raise expected("--material", material, "a number above 0")
     if workers < 0:
         raise expected("--workers", workers, "a number of 0 or more")
     kind = executor or ("dask" if scheduler else "serial")
@@ -75,8 +91,10 @@ def discover(
         raise expected("--executor", repr(kind), "serial, process or dask")
     output, names = Output(as_json), [name.strip() for name in holdout.split(",") if name.strip()]
     known, threads = load_robot(robot) if robot else None, (workers or None) if kind == "serial" else 1
+    driven = read_program(find_program(program)[0]) if program is not None else None
+    line = Material(material)
     tasks = {
-        folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures)
+        folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures, line, driven)
         for folder, case in folders(out, cases).items()
     }
     if kind != "serial" or len(tasks) > 1:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.model import NOTHING_TOLERATED, Effects, Model
+from gecar.reality.fitting.discrepancy import Discrepancy
+from gecar.reality.fitting.model import Effects, Model
 from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
@@ -40,22 +42,40 @@ class Estimator:
         As far as it is known.
     rng
         Random generator of the searches.
+    discrepancy
+        What the model is off by, as noise; None: the sensors' noise alone counts.
     """
 
-    def __init__(self, residuals: Residuals, robot: Robot, rng: np.random.Generator) -> None:
-        self.residuals, self.robot, self.rng = residuals, robot, rng
+    def __init__(
+        self,
+        residuals: Residuals,
+        robot: Robot,
+        rng: np.random.Generator,
+        discrepancy: Discrepancy | None = None,
+    ) -> None:
+        self.residuals, self.robot, self.rng, self.discrepancy = residuals, robot, rng, discrepancy
         self.blocks = Blocks(residuals.index)
         self._cache: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
 
+    def under(self, discrepancy: Discrepancy | None) -> Estimator:
+        """Return this with another discrepancy; derivatives taken so far are kept."""
+        other = copy(self)
+        other.discrepancy = discrepancy
+        return other
+
+    def cost_of(self, errors: Array) -> float:
+        """Return the robust cost of residuals in units of the sensors' noise, shape (n,)."""
+        return cost(self._whitened(errors))
+
     def known(self) -> Model:
         """Return the robot as it is known, with nothing fitted."""
-        return self._model((), np.zeros(0), NOTHING_TOLERATED)
+        return self._model((), np.zeros(0))
 
-    def residual(self, parameters: Parameters, tolerated: Array = NOTHING_TOLERATED) -> Residual:
+    def residual(self, parameters: Parameters) -> Residual:
         """Return the function that fits minimise."""
 
         def residual(z: Array) -> Array:
-            errors = self.residuals.errors_of_each(parameters.physics(z)) - tolerated
+            errors = self._whitened(self.residuals.errors_of_each(parameters.physics(z)))
             return errors if z.ndim == 2 else errors[0]
 
         return residual
@@ -63,7 +83,7 @@ class Estimator:
     def trial(self, model: Model, effect: str) -> Callable[[Sequence[Mapping[str, float]]], Array]:
         """Return the function from m values of one more effect, by label, to a model's residuals, shape (m, n)."""
         parameters = free(self.robot, (*model.effects, effect))
-        residual = self.residual(parameters, model.tolerated)
+        residual = self.residual(parameters)
 
         def errors(tried: Sequence[Mapping[str, float]]) -> Array:
             return residual(
@@ -77,40 +97,32 @@ class Estimator:
         effects: Sequence[str],
         values: Effects,
         rounds: int = 10,
-        tolerated: Array = NOTHING_TOLERATED,
     ) -> Model:
         """Fit all parameters of some effects together, from given values."""
         parameters = free(self.robot, effects)
-        residual = self.residual(parameters, tolerated)
+        residual = self.residual(parameters)
         start = parameters.vector(values)
         found = least_squares(residual, start, parameters.bounds, parameters.probes, rounds)
         energy = self.blocks.excess_energy(found.errors)
-        return Model(tuple(effects), parameters, found, energy, tolerated)
-
-    def tolerating(self, model: Model, tolerated: Array) -> Model:
-        """Return a model with something else subtracted from its residuals."""
-        errors = model.errors + model.tolerated - tolerated
-        found = Minimum(model.z, errors, cost(errors))
-        energy = self.blocks.excess_energy(errors)
-        return Model(model.effects, model.parameters, found, energy, tolerated)
+        return Model(tuple(effects), parameters, found, energy)
 
     def at(self, model: Model, z: Array) -> Model:
         """Return a model at other coordinates."""
-        return self._model(model.effects, z, model.tolerated)
+        return self._model(model.effects, z)
 
     def searched(self, model: Model, spread: float = REFINED_SPREAD) -> Model:
         """Search about a fit without derivatives; return the better one."""
-        parameters, residual = model.parameters, self.residual(model.parameters, model.tolerated)
+        parameters, residual = model.parameters, self.residual(model.parameters)
         wide = np.array([spread * c.parameter.search_spread for c in parameters.coordinates])
         z, least = cma_es(lambda at: cost_of_each(residual, at), model.z, wide, parameters.bounds, self.rng)
         return model if least >= model.cost else self.at(model, z)
 
     def sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
-        """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k).
+        """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k)."""
+        return [self._whitened(slopes.T).T for slopes in self.plain_sensitivities(model, effects)]
 
-        What is tolerated changes no derivative, so models with the same fit share theirs; those of the last few fits
-        are kept.
-        """
+    def plain_sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
+        """Return the same of residuals in units of the sensors' noise; those of the last few fits are kept."""
         key = (model.effects, model.z.tobytes())
         cached = self._cache.setdefault(key, {})
         missing = [effect for effect in effects if effect not in cached]
@@ -152,14 +164,17 @@ class Estimator:
             return 0.0
         return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.errors)) ** 2))
 
-    def _model(self, effects: tuple[str, ...], z: Array, tolerated: Array) -> Model:
+    def _whitened(self, errors: Array) -> Array:
+        return errors if self.discrepancy is None else self.discrepancy.whitened(errors)
+
+    def _model(self, effects: tuple[str, ...], z: Array) -> Model:
         parameters = free(self.robot, effects)
-        errors = self.residual(parameters, tolerated)(z)
+        errors = self.residual(parameters)(z)
         found = Minimum(z, errors, cost(errors))
-        return Model(effects, parameters, found, self.blocks.excess_energy(errors), tolerated)
+        return Model(effects, parameters, found, self.blocks.excess_energy(errors))
 
     def _differences(self, model: Model, effects: Sequence[str]) -> list[Array]:
-        raw, steps, moved = model.errors + model.tolerated, [], []
+        steps, moved = [], [model.physics]
         for effect in effects:
             own = effect in model.effects
             parameters = free(self.robot, model.effects if own else (*model.effects, effect))
@@ -170,5 +185,6 @@ class Estimator:
             vectors = np.tile(z, (len(of_effect), 1))
             vectors[range(len(of_effect)), of_effect] += steps[-1]
             moved.append(parameters.physics(vectors))
-        found = iter(self.residuals.errors_of_each(np.concatenate(moved)))
-        return [np.stack([(next(found) - raw) / step for step in each], axis=1) for each in steps]
+        here, *found = self.residuals.errors_of_each(np.concatenate(moved))
+        there = iter(found)
+        return [np.stack([(next(there) - here) / step for step in each], axis=1) for each in steps]

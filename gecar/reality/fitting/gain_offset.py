@@ -47,7 +47,7 @@ def _own(model: Model) -> npt.NDArray[np.intp]:
 
 
 def _weighted(estimator: Estimator, model: Model) -> Residual:
-    residual = estimator.residual(model.parameters, model.tolerated)
+    residual = estimator.residual(model.parameters)
     sd, even = estimator.residuals.reading_sd, estimator.residuals.recordings[0].noise.reflection_sd
     weight = np.where(sd > EVEN * even, 1.0 / EDGE_CAUTION, 1.0)
     return lambda z: residual(z) * weight

@@ -148,8 +148,19 @@ def _unrippled(errors: Errors) -> Array:
     return errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
 
 
+def ripple_responses(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Array]:
+    """Yield what ripples of a size worth a name and any phase add to residuals, shape (n, 4)."""
+    size = BY_ID["torque_ripple"].parameters[0].worthwhile * torque_scale(robot)
+    for _, amplitude, basis in _ripples(robot, recordings, errors, _unrippled(errors)):
+        yield basis * (size / amplitude)
+
+
 def _ripples(
-    robot: Robot, recordings: Sequence[Recording], errors: Errors, bare: Array
+    robot: Robot,
+    recordings: Sequence[Recording],
+    errors: Errors,
+    bare: Array,
+    scanned: Sequence[int] = CYCLES,
 ) -> Iterator[tuple[int, float, Array]]:
     """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
     turned = max(_turned(r, robot) for r in recordings)

@@ -15,8 +15,6 @@ from gecar.reality.optimisation.least_squares import Minimum
 Array = npt.NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
 
-NOTHING_TOLERATED = np.zeros(1)
-
 
 @dataclass(frozen=True)
 class Model:
@@ -32,15 +30,12 @@ class Model:
         Where the fit ended.
     excess_energy
         Energy of the residuals' block means above noise.
-    tolerated
-        What changes too small for a name explain, subtracted from the residuals; shape (n,) or (1,).
     """
 
     effects: tuple[str, ...]
     parameters: Parameters
     minimum: Minimum
     excess_energy: float
-    tolerated: Array = field(default_factory=lambda: NOTHING_TOLERATED)
 
     @property
     def values(self) -> dict[str, dict[str, float]]:
@@ -59,7 +54,7 @@ class Model:
 
     @property
     def errors(self) -> Array:
-        """Whitened residuals, less what is tolerated, shape (n,)."""
+        """Whitened residuals, shape (n,)."""
         return self.minimum.errors
 
     @property
@@ -77,7 +72,7 @@ class Step:
     effect
         Its identifier.
     base, model
-        The model without and with it, both rid of what changes too small for a name explain.
+        The model without and with it.
     gain
         What it lowers the cost by.
     left_out

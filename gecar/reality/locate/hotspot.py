@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.model import Model
 from gecar.reality.replay.kernel import X, Y
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.thresholds import HOTSPOT
+from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.thresholds import HOTSPOT, MEASURED
 
 Array = npt.NDArray[np.float64]
 
@@ -23,13 +26,27 @@ def hotspot(problem: Problem, model: Model) -> tuple[float, float] | None:
     return place if score >= HOTSPOT else None
 
 
+def with_spot(explained: Explanation) -> Explanation:
+    """Return an explanation with the place on the floor where something is left; what is material there counts."""
+    problem, model = explained.problem, explained.taken
+    spot = hotspot(problem, model)
+    if spot is None:
+        return explained
+    left = problem.sizes.left_about(problem.with_small_changes(model), spot)
+    material = problem.material.times(left) > MEASURED
+    if not (material or explained.unexplained):
+        return explained
+    return replace(explained, unexplained=True, spot=spot)
+
+
 def strongest_place(problem: Problem, model: Model) -> tuple[float, tuple[float, float]]:
     """Return the largest excess energy in a cell of the floor, in standard deviations of noise, and where."""
     cells = _cells(problem, model)
     there = ~np.isnan(cells[:, 0])
     if not there.any():
         return 0.0, (np.nan, np.nan)
-    excess = np.minimum(problem.estimator.blocks.excess_by_block(model.errors)[there], MOST_OF_A_BLOCK)
+    errors = problem.residuals.errors(problem.with_small_changes(model))
+    excess = np.minimum(problem.estimator.blocks.excess_by_block(errors)[there], MOST_OF_A_BLOCK)
     places, of = np.unique(cells[there], axis=0, return_inverse=True)
     count = np.bincount(of.ravel())
     scores = np.where(count >= LEAST_BLOCKS, np.bincount(of.ravel(), excess) / np.sqrt(2.0 * count), 0.0)

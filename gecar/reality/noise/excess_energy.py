@@ -43,6 +43,8 @@ class Blocks:
         self.samples = np.bincount(self._of, minlength=self.count)
         self._channel = np.zeros(self.count, np.int64)
         self._channel[self._of] = index.channel
+        self._channel_of_span = np.zeros(int(self.spans.max(initial=-1)) + 1, np.int64)
+        self._channel_of_span[self.spans] = index.channel
         self.recording = np.zeros(self.count, np.int64)
         self.recording[self._of] = index.recording
         self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
@@ -61,8 +63,19 @@ class Blocks:
         return float(np.sum(self._above(self.sums(np.clip(errors, -CLIP, CLIP)), inflation)))
 
     def excess_by_block(self, errors: Array) -> Array:
-        """Return each block's excess energy, in variances of its mean, shape (blocks,); 0 on average for noise."""
-        return self._above(self.sums(np.clip(errors, -CLIP, CLIP)), None)
+        """Return each block's energy above that of its channel's typical (median) block, in units of that, (blocks,).
+
+        Where a misfit is at one place, the typical block holds noise; where it is everywhere, none stands out. Encoders
+        are left out: their own errors go with the shaft's angle, not with the place.
+        """
+        energy = self.sums(np.clip(errors, -CLIP, CLIP)) ** 2 / self.samples
+        typical = np.ones(len(CHANNELS))
+        for channel in np.unique(self._channel):
+            typical[channel] = max(
+                float(np.median(energy[self._channel == channel])) / CHI_SQUARE_MEDIAN, 1.0
+            )
+        out: Array = np.where(np.isin(self._channel, ENCODERS), 0.0, energy / typical[self._channel] - 1.0)
+        return out
 
     def excess_energy_of_sums(self, sums: Array) -> float:
         """Return the excess energy of residuals of which only each block's sum is known, shape (blocks,)."""
@@ -71,6 +84,15 @@ class Blocks:
     def sums(self, values: Array) -> Array:
         """Return each block's sum of values, shape (blocks,)."""
         return np.bincount(self._of, values, self.count).astype(float)
+
+    def variances(self, errors: Array) -> Array:
+        """Return the variance of each channel's means over half-second spans, shape (channels,); 1 for white noise."""
+        energy = np.bincount(self.spans, errors) ** 2 / np.bincount(self.spans)
+        total, count = (
+            np.bincount(self._channel_of_span, v, len(CHANNELS)) for v in (energy, np.ones(len(energy)))
+        )
+        out: Array = np.where(count > 0.0, total / np.maximum(count, 1.0), 1.0)
+        return out
 
     def inflation(self, errors: Array) -> Array:
         """Return the variance inflation of each channel's block means, shape (channels,); 1 for white noise.

@@ -11,9 +11,10 @@ from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.model_tolerance import without_tolerated
+from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import Share, share_asked_for
-from gecar.reality.selection.stepwise import Explanation, is_unexplained
+from gecar.reality.selection.stepwise import Explanation, concluded
+from gecar.reality.selection.thresholds import MAIN_SHARE
 
 Array = npt.NDArray[np.float64]
 
@@ -38,7 +39,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
-    it was fitted, predicts worse than none (`share_asked_for`).
+    it was fitted, predicts worse than none (`share_asked_for`). Where much is left that nothing explains, whole drives
+    must come out better with the effect, too.
 
     Parameters
     ----------
@@ -54,7 +56,10 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
         explained = replace(explained, steps=tuple(step for step, _ in judged))
         worst, share = min(judged, key=lambda pair: pair[1].margin)
         if share.margin > 0.0:
-            break
+            useless = [s for s in explained.steps if explained.unexplained and not _helps(explained, held, s)]
+            if not useless:
+                break
+            worst = useless[0]
         candidates.append(worst)
         explained = dropped(explained, worst)
     return Confirmation(explained, tuple(candidates))
@@ -65,25 +70,37 @@ def _judged(explained: Explanation, held: Residuals, step: Step, with_all: Array
 
     ``with_all`` are their residuals under all steps, shape (n,).
     """
-    without = _held_errors(explained, held, _without(explained, step))
+    without = _held_errors(explained, held, _without(explained.problem, explained.taken, step))
     share = share_asked_for(held.index, without, with_all)
     return replace(step, holdout_gain=cost(without) - cost(with_all)), share
 
 
+def _helps(explained: Explanation, held: Residuals, step: Step) -> bool:
+    """Whether an effect explains a good part of what whole drives set aside leave without it."""
+    problem, sizes = explained.problem, explained.problem.sizes.of(held)
+    models = explained.taken, _without(problem, explained.taken, step)
+    now, before = (
+        problem.material.times(sizes.left(problem.with_small_changes(model, explained.taken)))
+        for model in models
+    )
+    return now**2 < (1.0 - MAIN_SHARE) * before**2
+
+
 def dropped(explained: Explanation, step: Step) -> Explanation:
     """Return an explanation without an effect, the others refitted; the robot's own value of it comes back."""
-    problem, taken = explained.problem, _without(explained, step)
-    left = without_tolerated(problem, taken)
-    steps = tuple(s for s in explained.steps if s.effect != step.effect)
-    return replace(explained, taken=taken, left=left, steps=steps, unexplained=is_unexplained(problem, left))
+    steps = [s for s in (*explained.steps, *explained.minor) if s.effect != step.effect]
+    model = _without(explained.problem, explained.whole, step)
+    return concluded(explained.problem, model, steps, explained.tried)
 
 
-def _without(explained: Explanation, step: Step) -> Model:
-    rest = [effect for effect in explained.taken.effects if effect != step.effect]
-    return explained.problem.estimator.fit(rest, explained.taken.values)
+def _without(problem: Problem, model: Model, step: Step) -> Model:
+    rest = [effect for effect in model.effects if effect != step.effect]
+    return problem.under(model, rest).estimator.fit(rest, model.values)
 
 
 def _held_errors(explained: Explanation, held: Residuals, model: Model) -> Array:
+    """Return residuals of recordings set aside, with the small changes that recordings fitted to ask for."""
+    physics = explained.problem.with_small_changes(model, explained.taken)
     if explained.problem.clocks_fitted and not held.sensor:
-        held = with_fitted_clocks(held, model.physics)[0]
-    return held.errors(model.physics)
+        held = with_fitted_clocks(held, physics)[0]
+    return held.errors(physics)

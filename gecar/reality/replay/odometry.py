@@ -23,7 +23,7 @@ def odometry(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
     rows = replayer.open_loop().play(physics).rows
     p = physics[0]
     measured = replayer.measured[:, :2]
-    rolled = np.column_stack([_smoothed(measured[:, k] - rows[:, k], replayer.t) for k in range(2)])
+    rolled = np.column_stack([smoothed_rows(measured[:, k] - rows[:, k], replayer.t) for k in range(2)])
     radius = p["wheel_radius"] * p["radius_scale"]
     rolled = np.diff(rolled * radius * (1.0 + 0.5 * p["radius_difference"] * np.array([-1.0, 1.0])), axis=0)
     pose = rows[:, [X, Y, HEADING]]
@@ -35,7 +35,7 @@ def odometry(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
     return integrated(ahead, aside, turn, pose[0])
 
 
-def _smoothed(values: Array, t: Array) -> Array:
+def smoothed_rows(values: Array, t: Array) -> Array:
     """Return a running mean over `SMOOTH_ROWS`, gaps filled straight; 0 where nothing was measured."""
     there = ~np.isnan(values)
     if there.sum() < 2:

@@ -25,6 +25,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 Physics = npt.NDArray[Any]
 
+GYRO_SCALE, GYRO_BIAS_RAD_S = 0.02, 0.01  # a LEGO gyro: within 2 % and 0.6 deg/s
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
@@ -73,6 +74,24 @@ class Residuals:
             *(np.concatenate([getattr(i, f) for i, _ in parts]) for f in ("recording", "channel", "t_s"))
         )
         return whole.kept(there), there
+
+    def gyro_errors(self) -> Array:
+        """Return what a gyro with a scale and a bias of its own adds to residuals of motion, shape (n, 2).
+
+        Of a size that is not worth a name: `GYRO_SCALE` and `GYRO_BIAS_RAD_S`.
+        """
+        if self.sensor or not self.recordings:
+            return np.zeros((len(self.index.t_s), 2))
+        parts = []
+        for run in self.recordings:
+            rows, poses = len(run.replayer.t), len(run.replayer.inputs.pose_t)
+            part = np.zeros((4 * rows + 3 * poses, 2))
+            rate, sd = run.replayer.measured[:, 3], float(run.noise.sd[2])
+            part[3 * rows : 4 * rows] = (
+                np.column_stack([GYRO_SCALE * rate, np.full(rows, GYRO_BIAS_RAD_S)]) / sd
+            )
+            parts.append(part)
+        return np.concatenate(parts)[self._located[1]]
 
     @property
     def index(self) -> ResidualIndex:

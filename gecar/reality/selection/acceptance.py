@@ -7,18 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.fitting.parameters import Parameters
+from gecar.reality.fitting.parameters import Parameters, free
+from gecar.reality.materiality import Size
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import spread_of_size
 from gecar.reality.selection.thresholds import (
     COMPETING,
     LEAST_INVERSE,
-    MAIN_SHARE,
-    MORE_SHARE,
+    PRICE,
     SIGNIFICANCE,
     STEADY,
     STOPPED,
-    WHOLE_SHARE,
 )
 from gecar.world.effects import BY_ID
 
@@ -52,14 +51,24 @@ def is_worthwhile(model: Model, effect: str) -> bool:
 
 
 def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
-    """Return the best steps of a stage that explain enough, with every effect of a size worth a name."""
+    """Return the best steps of a stage that gain enough; on a bench, where nothing is noise, of sizes worth a name."""
+    if problem.on_bench:
+        stage = [step for step in stage if step.worthwhile]
+    best = max((step.gain for step in stage), default=0.0)
     return [
-        step
-        for step in stage[:RUNNERS_UP]
-        if all(is_worthwhile(step.model, effect) for effect in step.model.effects)
-        and step.drop >= problem.limits.least_drop * problem.blocks
-        and step.gain >= COMPETING * stage[0].gain
+        step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best) and not stopped(step)
     ]
+
+
+def stopped(step: Step) -> bool:
+    """Whether any size grew until a bound stopped it: a cause has a size, what has none imitates another."""
+    parameters, z = step.model.parameters, step.model.z
+    low, high = parameters.bounds
+    return any(
+        z[k] != 0.0 and abs(z[k]) > STOPPED and (z[k] > high[k] - AT_BOUND or z[k] < low[k] + AT_BOUND)
+        for k, c in enumerate(parameters.coordinates)
+        if c.parameter.worthwhile > 0.0 or c.inverse
+    )
 
 
 def proved(step: Step) -> bool:
@@ -67,37 +76,18 @@ def proved(step: Step) -> bool:
     return bool(step.left_out.sum() > step.null_95 and step.p < SIGNIFICANCE)
 
 
-def number_accepted(problem: Problem, steps: Sequence[Step]) -> int:
-    """Return how many steps of a chain are accepted.
-
-    Together they must explain nearly all excess energy; then each must explain a good part of what the others leave,
-    or be needed to get there.
-    """
-    if not steps:
-        return 0
-    limits, before = problem.limits, steps[0].energy_before
-    floor = limits.floor * problem.blocks
-    excess = max(before - floor, limits.least_drop * problem.blocks)
-    accepted, whole_before = 0, False
-    for number, step in enumerate(steps, start=1):
-        whole = before - step.energy_after >= WHOLE_SHARE * excess
-        main = step.drop >= MAIN_SHARE * step.energy_before
-        if whole_before and not problem.on_bench:
-            main &= step.drop >= MORE_SHARE * (step.energy_before - floor)
-        if whole and main and (not whole_before or accepted == number - 1):
-            accepted = number
-        whole_before = whole_before or whole
-    return accepted
+def is_material(problem: Problem, model: Model, step: Step) -> bool:
+    """Whether an effect is worth a name, and moves the robot by enough for anyone to mind."""
+    return is_worthwhile(model, step.effect) and problem.material.times(size_of(problem, model, step)) >= 1.0
 
 
-def number_beside_the_unexplained(problem: Problem, steps: Sequence[Step]) -> int:
-    """Return how many steps of a chain are accepted though together they leave much that nothing explains.
+def size_of(problem: Problem, model: Model, step: Step) -> Size:
+    """Return what an effect does to the robot under the commands of the recordings."""
+    values = {effect: v for effect, v in model.values.items() if effect != step.effect}
+    parameters = free(problem.estimator.robot, model.effects)
+    return problem.sizes.apart(model.physics, parameters.physics(parameters.vector(values)))
 
-    Each must explain a good part of what the others leave, and be of one size in all recordings: imitations are not.
-    """
-    folds = problem.estimator.blocks.folds
-    for number, step in enumerate(steps):
-        steady = spread_of_size(folds, step.base.errors, step.model.errors) < STEADY
-        if not steady or step.drop < MAIN_SHARE * step.energy_before:
-            return number
-    return len(steps)
+
+def steady(problem: Problem, step: Step) -> bool:
+    """Whether an effect has one size in all recordings: imitations have not."""
+    return spread_of_size(problem.estimator.blocks.folds, step.base.errors, step.model.errors) < STEADY

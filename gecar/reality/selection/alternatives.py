@@ -8,7 +8,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import costs
 from gecar.reality.selection.acceptance import is_worthwhile
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CERTAIN, CLOSE
+from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
 
 
 def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
@@ -22,7 +22,7 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
         swapped = estimator.fit((*rest, other.effect), {**taken.values, **other.model.values})
         loss = costs(swapped.errors) - costs(taken.errors)
         spans = np.bincount(estimator.blocks.spans, loss)
-        close = loss.sum() < CLOSE * step.gain
+        close = loss.sum() < min(CLOSE * step.gain, PRICE)
         uncertain = loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2))
         if close and uncertain and is_worthwhile(swapped, other.effect):
             out[other.effect] = swapped

@@ -60,7 +60,7 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
     slopes, errors, z = estimator.own_sensitivities(model), model.errors, model.z
     if not len(z):
         return np.bincount(estimator.blocks.folds, costs(errors)).astype(float)
-    w, residual = weights(errors), estimator.residual(model.parameters, model.tolerated)
+    w, residual = weights(errors), estimator.residual(model.parameters)
     out = np.zeros(int(estimator.blocks.folds.max()) + 1)
     folds, fitted = np.unique(estimator.blocks.folds), []
     normal = slopes.T @ (w[:, None] * slopes)

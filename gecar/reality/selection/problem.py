@@ -6,16 +6,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from gecar.reality.fitting.clock_offsets import scattered, with_fitted_clocks
+from gecar.reality.fitting.discrepancy import discrepancy
 from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.initial_values import ripple_responses
 from gecar.reality.fitting.model import Model
-from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.fitting.parameters import free
+from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.thresholds import NEGLIGIBLE, EnergyLimits
+from gecar.reality.residuals.of_case import Physics, Residuals
+from gecar.reality.residuals.parting import Sizes
+from gecar.reality.selection.thresholds import LARGE, PRICE, SMALL
+from gecar.world.effects import BY_ID, Parameter
 from gecar.world.robot import Robot
 
+Array = npt.NDArray[np.float64]
+RIPPLE = "torque_ripple"
+LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
 COMMON_DELAY = "pose_delay"  # the effect that camera clocks late by the same time are
 
 
@@ -29,8 +38,10 @@ class Problem:
         Fits effects to the residuals.
     catalogue
         Identifiers of the effects that may be found.
-    limits
-        Excess energy that counts.
+    material
+        From what size on something is material.
+    sizes
+        How much it matters what robots differ by.
     known
         The robot with nothing fitted.
     tell
@@ -41,7 +52,8 @@ class Problem:
 
     estimator: Estimator
     catalogue: tuple[str, ...]
-    limits: EnergyLimits
+    material: Material
+    sizes: Sizes
     known: Model
     tell: Callable[[str], None]
     clocks_fitted: bool = False
@@ -66,6 +78,48 @@ class Problem:
         """Whether all recordings were made on a bench."""
         return all(r.setup.rig == "bench" for r in self.recordings)
 
+    def under(self, model: Model, free_effects: Sequence[str] | None = None) -> Problem:
+        """Return the problem with the discrepancy that a model leaves; effects that are free (its own) are no part.
+
+        A motor on a bench is known to tenths of a percent, and what its model is off by is what one looks for.
+        """
+        if not self.blocks or self.on_bench:
+            return self
+        kept = model.effects if free_effects is None else free_effects
+        slopes = np.concatenate(
+            [np.where(e in kept, 0.0, g) for e, g in small_sensitivities(self, model).items()], axis=1
+        )
+        errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
+        left = discrepancy(slopes, errors, self.estimator.blocks, channel, SMALL, LARGE)
+        estimator = self.estimator.under(left)
+        return replace(self, estimator=estimator, known=estimator.known())
+
+    def with_small_changes(self, model: Model, beside: Model | None = None) -> Physics:
+        """Return a model's physics record with the most likely small changes of all other parameters, shape (1,).
+
+        They are those that this model asks for, or another one.
+        """
+        values = self.small_changes(model, beside)
+        parameters = free(self.estimator.robot, list(values))
+        return parameters.physics(parameters.vector(values))
+
+    def small_changes(self, model: Model, beside: Model | None = None) -> dict[str, dict[str, float]]:
+        """Return a model's values with the most likely small changes of all other parameters, by effect and label."""
+        if self.estimator.discrepancy is None:
+            return model.values
+        errors = self.residuals.errors((beside or model).physics)
+        slopes = self.estimator.discrepancy.back.shape[1]
+        others = [effect for effect in self.catalogue if effect not in model.effects]
+        parameters = free(self.estimator.robot, (*model.effects, *others))
+        z, (lowest, highest) = parameters.vector(model.values), parameters.bounds
+        place = {(c.effect.id, c.parameter.label): k for k, c in enumerate(parameters.coordinates)}
+        at = [place[effect, p.label] for effect in self.catalogue for p in _small(effect)]
+        low, high = np.full(slopes, -1.0), np.full(slopes, 1.0)  # ripples and gyro come last, and stay out
+        low[: len(at)] = np.clip(lowest[at] - z[at], -1.0, -LEAST_ROOM)
+        high[: len(at)] = np.clip(highest[at] - z[at], LEAST_ROOM, 1.0)
+        z[at] += self.estimator.discrepancy.small_changes(errors, low, high)[: len(at)]
+        return parameters.values(np.clip(z, lowest, highest))
+
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
         """Return the problem with camera clocks fitted under a model; None where that gains less than ``least_gain``.
 
@@ -73,22 +127,31 @@ class Problem:
         """
         if self.clocks_fitted or self.residuals.sensor:
             return None
-        fitted, least = with_fitted_clocks(self.residuals, model.physics)
-        gain = cost(self.residuals.errors(model.physics)) - least
-        if gain < max(least_gain, NEGLIGIBLE * self.blocks) or not scattered(fitted.clock_offsets_s):
+        fitted, _ = with_fitted_clocks(self.residuals, model.physics)
+        before, after = (self.estimator.cost_of(r.errors(model.physics)) for r in (self.residuals, fitted))
+        alone = len(fitted.recordings) == 1  # then a late clock is what a late camera is
+        least = PRICE if alone else max(least_gain, PRICE)
+        if before - after < least or not (alone or scattered(fitted.clock_offsets_s)):
             return None
         self.tell("the camera's clock differs from recording to recording: its offsets are fitted")
         estimator = Estimator(fitted, self.estimator.robot, self.estimator.rng)
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        known = estimator.known()
-        return replace(self, estimator=estimator, catalogue=others, known=known, clocks_fitted=True)
+        sizes = Sizes(fitted.recordings, fitted.sensor)
+        return replace(
+            self,
+            estimator=estimator,
+            catalogue=others,
+            sizes=sizes,
+            known=estimator.known(),
+            clocks_fitted=True,
+        )
 
 
 def problem_of(
     residuals: Residuals,
     robot: Robot,
     catalogue: Sequence[str],
-    limits: EnergyLimits,
+    material: Material = DEFAULT,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
 ) -> Problem:
@@ -102,12 +165,38 @@ def problem_of(
         As far as it is known.
     catalogue
         Identifiers of the effects that may be found.
-    limits
-        Excess energy that counts.
+    material
+        From what size on something is material.
     seed
         Random seed.
     tell
         Called with a line of progress.
     """
     estimator = Estimator(residuals, robot, np.random.default_rng(seed))
-    return Problem(estimator, tuple(catalogue), limits, estimator.known(), tell)
+    sizes = Sizes(residuals.recordings, residuals.sensor)
+    return Problem(estimator, tuple(catalogue), material, sizes, estimator.known(), tell)
+
+
+def small_sensitivities(problem: Problem, model: Model) -> dict[str, Array]:
+    """Return the derivatives of residuals by small changes, in sizes worth a name, by effect, shape (n, changes).
+
+    The ripple of a motor that is known for none has no phase yet: it may be any sum of sines. It comes after all other
+    effects; then, under no name, what a gyro's own scale and bias do.
+    """
+    plain = problem.estimator.under(None)
+    found = plain.plain_sensitivities(model, problem.catalogue)
+    out = {}
+    for effect, slopes in zip(problem.catalogue, found, strict=True):
+        small = _small(effect)
+        out[effect] = slopes[:, [p in small for p in BY_ID[effect].parameters]]
+    if RIPPLE in out:
+        del out[RIPPLE]
+        if RIPPLE not in model.effects:
+            waves = ripple_responses(plain.robot, problem.recordings, plain.trial(model, RIPPLE))
+            out[RIPPLE] = np.concatenate([np.zeros((len(model.errors), 0)), *waves], axis=1)
+    return {**out, "": problem.residuals.gyro_errors()}
+
+
+def _small(effect: str) -> list[Parameter]:
+    """Return the parameters that may be off a little: derivatives at neutral say what that does."""
+    return [] if effect == RIPPLE else [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0]

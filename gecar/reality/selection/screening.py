@@ -15,13 +15,13 @@ from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.fitting.parameters import free as free_parameters
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import Minimum, cost_of_each, least_squares
-from gecar.reality.selection.acceptance import is_worthwhile, worthwhile
-from gecar.reality.selection.model_tolerance import tolerated
+from gecar.reality.selection.acceptance import is_worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.thresholds import (
     COMPETING,
     DOUBTFUL_FIT,
     NEGLIGIBLE,
+    PRICE,
     SEARCHED,
 )
 from gecar.world.effects import BY_ID, Search
@@ -29,6 +29,7 @@ from gecar.world.effects import BY_ID, Search
 Array = npt.NDArray[np.float64]
 
 IMPROVED, REFITTED = 10, 5  # effects of a stage that are improved by two iterations, and fitted in full
+PROMISING = 0.5  # of the price of a name: what is tried at all
 SHORT = 8  # generations of a first search
 FINALIST_SPREAD = 0.6  # of a parameter's search spread, for the second search
 DOUBTFUL_SPREAD = 1.5  # of a parameter's search spread, about a fit that leaves much
@@ -65,21 +66,18 @@ class _Trial:
 
 def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
-    estimator, small = problem.estimator, tolerated(problem, model)
+    estimator = problem.estimator
     others = [e for e in problem.catalogue if e not in model.effects]
-    bases = {e: estimator.tolerating(model, small[e]) for e in others}
     estimator.sensitivities(model, others)  # all at once, in lock step
-    trials = [t for t in (_scored(problem, bases[e], e) for e in others) if t]
+    trials = [t for t in (_scored(problem, model, e) for e in others) if t]
     trials.sort(key=lambda t: -t.promise)
-    if not trials or trials[0].promise < NEGLIGIBLE * problem.blocks:
+    if not trials or trials[0].promise < PROMISING * PRICE:
         return []
     begun = [_improved(estimator, t) for t in trials[:IMPROVED]]
     begun.sort(key=lambda t: t.minimum.cost)
-    # What is too small for a name may gain by imitating much; it must not shut the others out.
-    named = [t.gain for t in begun if worthwhile(t.parameters, t.minimum.z, t.effect)]
-    best = max(named, default=max(t.gain for t in begun))
+    best = max(t.gain for t in begun)
     steps = [
-        step_of(estimator, t.effect, t.base, _fitted(estimator, t, best, model))
+        step_of(estimator, t.effect, t.base, _fitted(estimator, t, best))
         for t in begun[:REFITTED]
         if t.gain >= NEGLIGIBLE * best
     ]
@@ -112,22 +110,22 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
 
 def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
     """Improve an effect's best start by two iterations."""
-    residual = estimator.residual(trial.parameters, trial.base.tolerated)
+    residual = estimator.residual(trial.parameters)
     bounds, probes = trial.parameters.bounds, trial.parameters.probes
     return replace(trial, minimum=least_squares(residual, trial.starts[0], bounds, probes, rounds=2))
 
 
-def _fitted(estimator: Estimator, trial: _Trial, best: float, model: Model) -> Model:
+def _fitted(estimator: Estimator, trial: _Trial, best: float) -> Model:
     """Fit an effect in full; search without derivatives where they mislead and the effect is a rival."""
-    if trial.search and trial.gain > COMPETING * best and best > SEARCHED * model.cost:
+    if trial.search and trial.gain > COMPETING * best and trial.gain > SEARCHED * PRICE:
         return _searched(estimator, trial, trial.search)
-    return estimator.fit(trial.effects, trial.values, tolerated=trial.base.tolerated)
+    return estimator.fit(trial.effects, trial.values)
 
 
 def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:
     """Fit an effect from several starts without derivatives, then with them."""
     model, parameters = trial.base, trial.parameters
-    residual = estimator.residual(parameters, model.tolerated)
+    residual = estimator.residual(parameters)
     own = slice(len(model.z), None)
     spread = np.array([c.parameter.search_spread for c in parameters.coordinates[own]])
     low, high = parameters.bounds
@@ -152,7 +150,7 @@ def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:
         )
         if found < least:
             best, least = np.r_[model.z, tail], found
-    refined = estimator.fit(trial.effects, parameters.values(best), tolerated=model.tolerated)
+    refined = estimator.fit(trial.effects, parameters.values(best))
     return estimator.searched(refined)
 
 
@@ -161,7 +159,7 @@ def _searched_about(estimator: Estimator, model: Model) -> Model:
     again = estimator.searched(model, DOUBTFUL_SPREAD)
     if again is model:
         return model
-    found = estimator.fit(again.effects, again.values, tolerated=again.tolerated)
+    found = estimator.fit(again.effects, again.values)
     return found if found.cost < again.cost else again
 
 

@@ -29,6 +29,7 @@ from gecar.reality.selection.thresholds import SIGNIFICANCE
 Array = npt.NDArray[np.float64]
 
 AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an effect as without
+LEAST_CHANGE = 1e-6  # squared standard deviations: recordings in which an effect does not show
 ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
 
 
@@ -60,7 +61,7 @@ def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) ->
         Whitened residuals of the two models, shape (n,).
     """
     change = without - with_effect
-    if not np.any(change):
+    if float(change @ change) < LEAST_CHANGE:
         return NONE
     value = 0.0
     for _ in range(ROUNDS):

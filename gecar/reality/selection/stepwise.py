@@ -1,6 +1,8 @@
 """Stepwise selection: effects added one by one while each proves itself, then swapped and dropped; or none named.
 
-Source: forward, backward and stepwise selection, Draper and Smith, Applied Regression Analysis (3rd ed.), ch. 15.
+Every stage begins with what the model so far is off by (`gecar.reality.fitting.discrepancy`): an effect is added where
+it gains beside that. Source: forward, backward and stepwise selection, Draper and Smith, Applied Regression Analysis
+(3rd ed.), ch. 15.
 """
 
 from __future__ import annotations
@@ -9,30 +11,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.selection.acceptance import (
-    RUNNERS_UP,
-    candidates,
-    is_worthwhile,
-    number_accepted,
-    number_beside_the_unexplained,
-    proved,
-)
+from gecar.reality.materiality import Size
+from gecar.reality.selection.acceptance import candidates, is_material, proved, steady, stopped
 from gecar.reality.selection.cross_validation import judged
-from gecar.reality.selection.model_tolerance import without_tolerated
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
 from gecar.reality.selection.thresholds import (
     CLOCKS_FIRST,
     CLOCKS_OVER_COMMON,
     COMPETING,
+    LEFT_SHARE,
     MAIN_SHARE,
+    MEASURED,
     MOST_EFFECTS,
     MOST_ON_BENCH,
-    UNEXPLAINED_SHARE,
+    PRICE,
+    WHOLE_SHARE,
 )
 from gecar.world.effects import BY_ID
 
 BEGINNINGS = 3  # effects of the first stage a chain may begin with
+RIVALS = 4  # effects of a stage that are tried in the place of one that was taken
 
 
 @dataclass(frozen=True)
@@ -42,100 +41,125 @@ class Explanation:
     Attributes
     ----------
     problem
-        The problem, with the camera's clocks fitted if they had to be.
+        The problem, under the discrepancy of the model that was taken.
     taken
-        The model with the effects that were taken.
-    left
-        The same, rid of what changes too small for a name explain.
+        The model with the effects that are named.
     steps
         How they were taken, in order.
     tried
         Everything fitted at each stage, for runners-up.
+    left
+        How far the model, its constants fitted, parts from the recordings.
     unexplained
-        Whether excess energy is left that no effect explains.
+        Whether that is material.
+    minor, whole
+        Effects that are too small for a name, and the model with them.
     spot
-        Where on the floor it is left, if at one place only: x, y [m].
+        Where on the floor something is left, if at one place only: x, y [m].
     """
 
     problem: Problem
     taken: Model
-    left: Model
     steps: tuple[Step, ...]
     tried: tuple[tuple[Step, ...], ...]
+    left: Size
     unexplained: bool
+    minor: tuple[Step, ...]
+    whole: Model
     spot: tuple[float, float] | None = None
 
 
 def explain(problem: Problem) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate.
 
-    Where they explain nearly all, they are taken; where they do not, those of one size in all recordings. Where it
-    takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
+    Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
     """
-    first = candidate_steps(problem, problem.known) if _worth_fitting(problem, problem.known) else []
-    with_clocks = _with_clocks(problem, problem.known, first)
+    known = problem.under(problem.known)
+    first = candidate_steps(known, known.known)
+    with_clocks = _with_clocks(known, known.known, first)
     if with_clocks is not None:
         return explain(with_clocks)
     chain = _forward(problem, first)
     if chain.with_clocks is not None:
         return explain(chain.with_clocks)
-    chains = [chain, *_other_beginnings(problem, first, chain)]
-    if not any(each.steps for each in chains):
-        chains = [each.beside_the_unexplained(problem) for each in chains]
-    best = _shortest(chains, problem)
+    best = _best_chain(problem, [chain, *_other_beginnings(problem, first, chain)])
     tried = (tuple(first), *best.tried[1:])
-    taken, steps = _swapped_and_dropped(problem, best.steps, tried)
-    left = without_tolerated(problem, taken)
-    return Explanation(problem, taken, left, steps, tried, is_unexplained(problem, left))
+    model, steps = _swapped_and_dropped(problem, best, tried)
+    return concluded(problem, model, steps, tried)
 
 
-def is_unexplained(problem: Problem, left: Model) -> bool:
-    """Whether a model leaves more excess energy than the simulation itself does."""
-    floor = max(problem.limits.unexplained * problem.blocks, UNEXPLAINED_SHARE * problem.known.excess_energy)
-    return left.excess_energy > floor
+def concluded(
+    problem: Problem, model: Model, steps: Sequence[Step], tried: Sequence[tuple[Step, ...]]
+) -> Explanation:
+    """Judge what effects leave, and which of them are material.
+
+    Where they leave much that is material, only those are kept that have one size in all recordings, and explain a good
+    part of what is left without them.
+    """
+    problem = problem.under(model)
+    left = problem.sizes.left(problem.with_small_changes(model))
+    now, before = (problem.material.times(size) for size in (left, problem.sizes.left(problem.known.physics)))
+    share, matters = now / max(before, 1.0), now > MEASURED
+    if matters and share > (1.0 - WHOLE_SHARE) ** 0.5:
+        kept = [step for step in steps if steady(problem, step) and _is_main(problem, model, step, now)]
+        if len(kept) < len(steps):
+            rest = problem.under(problem.known, [s.effect for s in kept])
+            fitted = rest.estimator.fit([s.effect for s in kept], model.values)
+            return concluded(problem, fitted, kept, tried)
+    minor = tuple(step for step in steps if not is_material(problem, model, step))
+    named, whole = tuple(step for step in steps if step not in minor), model
+    if minor:  # what carries no claim bends no other effect's size
+        problem = problem.under(model, [step.effect for step in named])
+        model = problem.estimator.fit([step.effect for step in named], model.values)
+    return Explanation(
+        problem, model, named, tuple(tried), left, matters and share > LEFT_SHARE, minor, whole
+    )
+
+
+def _is_main(problem: Problem, model: Model, step: Step, times: float) -> bool:
+    """Whether an effect explains a good part of what the others leave; ``times`` the line is left with it."""
+    rest = [effect for effect in model.effects if effect != step.effect]
+    here = problem.under(model, rest)
+    without = here.sizes.left(here.with_small_changes(here.estimator.fit(rest, model.values)))
+    return times**2 < (1.0 - MAIN_SHARE) * problem.material.times(without) ** 2
 
 
 @dataclass(frozen=True)
 class _Chain:
     """One forward selection.
 
-    Of the ``proved`` steps the first ``steps`` were accepted and end in ``model``; ``with_clocks`` is the problem to
-    begin anew, where the camera's clocks had to be fitted on the way.
+    Of the steps taken ``model`` holds the effects; ``with_clocks`` is the problem to begin anew, where the camera's
+    clocks had to be fitted on the way.
     """
 
-    proved: tuple[Step, ...]
     steps: tuple[Step, ...]
     model: Model
     tried: tuple[tuple[Step, ...], ...]
     with_clocks: Problem | None = None
 
-    def beside_the_unexplained(self, problem: Problem) -> _Chain:
-        """Return this with the steps that are accepted though nothing explains the rest."""
-        steps = self.proved[: number_beside_the_unexplained(problem, self.proved)]
-        return replace(self, steps=steps, model=steps[-1].model if steps else self.model)
-
 
 def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
     """Go on from a first stage until nothing more proves itself."""
     model, steps, tried = problem.known, list[Step](), list[tuple[Step, ...]]()
-    stage = tuple(first)
+    here, stage = problem.under(model), tuple(first)
     most = int(MOST_ON_BENCH if problem.on_bench else MOST_EFFECTS)
     while True:
         tried.append(stage)
-        step = _best(problem, stage)
+        step = _best(here, stage)
         if step is None:
             break
-        problem.tell(f"{step.effect}: explains {step.drop / step.energy_before:.0%} of what is left")
+        problem.tell(f"{step.effect}: gains {step.gain:.0f}")
         steps.append(replace(step, stage=len(steps)))
-        model = step.model
-        if len(steps) == most or not _worth_fitting(problem, model):
+        if len(steps) == most:
+            model = step.model
             break
-        stage = tuple(candidate_steps(problem, model))
-        with_clocks = _with_clocks(problem, model, stage)
+        here = problem.under(step.model)
+        model = here.estimator.fit(step.model.effects, step.model.values)
+        stage = tuple(candidate_steps(here, model))
+        with_clocks = _with_clocks(here, model, stage)
         if with_clocks is not None:
-            return _Chain((), (), problem.known, (), with_clocks)
-    accepted = tuple(steps[: number_accepted(problem, steps)])
-    return _Chain(tuple(steps), accepted, accepted[-1].model if accepted else problem.known, tuple(tried))
+            return _Chain((), problem.known, (), with_clocks)
+    return _Chain(tuple(steps), model, tuple(tried))
 
 
 def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
@@ -144,73 +168,74 @@ def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
-    """Return the chains that begin with a runner-up, where the first took several effects, or explained a good part."""
-    part = bool(chain.proved) and chain.proved[0].drop >= MAIN_SHARE * chain.proved[0].energy_before
-    if not (len(chain.steps) > 1 or (not chain.steps and part)):
+    """Return the chains that begin with a runner-up, where the first took several effects."""
+    if len(chain.steps) < 2:
         return []
-    rivals = [
-        step for step in first[1:BEGINNINGS] if step.worthwhile and step.gain > COMPETING * first[0].gain
-    ]
+    rivals = [s for s in first[1:BEGINNINGS] if s.gain > COMPETING * first[0].gain and not stopped(s)]
     chains = [_forward(problem, [step]) for step in rivals]
     return [other for other in chains if other.with_clocks is None]
 
 
-def _shortest(chains: Sequence[_Chain], problem: Problem) -> _Chain:
-    """Return the chain with the fewest effects, unless a longer one explains a good part of what that leaves."""
-    floor = problem.limits.floor * problem.blocks
-    accepted = [chain for chain in chains if chain.steps] or list(chains)
-    accepted.sort(key=lambda chain: (len(chain.steps), chain.model.cost))
-    best = accepted[0]
-    for chain in accepted[1:]:
-        left, more_left = (max(c.model.excess_energy, floor) for c in (chain, best))
-        if len(chain.steps) > len(best.steps) and left < (1.0 - MAIN_SHARE) * more_left:
-            best = chain
-    return best
+def _best_chain(problem: Problem, chains: Sequence[_Chain]) -> _Chain:
+    """Return the chain that costs least, names included, under the smallest discrepancy any of them leaves."""
+    if len(chains) == 1:
+        return chains[0]
+    spaces = [problem.under(chain.model, ()).estimator for chain in chains]
+    under = min(spaces, key=lambda e: float(e.discrepancy.ratios.sum()) if e.discrepancy else 0.0)
+    return min(
+        chains, key=lambda c: under.cost_of(problem.residuals.errors(c.model.physics)) + PRICE * len(c.steps)
+    )
 
 
 def _swapped_and_dropped(
-    problem: Problem, accepted: Sequence[Step], tried: Sequence[Sequence[Step]]
+    problem: Problem, chain: _Chain, tried: Sequence[Sequence[Step]]
 ) -> tuple[Model, tuple[Step, ...]]:
-    """Refit what was accepted, with everything but the effects back at the robot's own constants.
+    """Judge every effect of a chain beside all others, under what they leave together.
 
     An effect taken early may have stood in for a cause that only the later ones let come forward: each is swapped
     against its runners-up, and dropped where the others can do without it.
     """
-    if not accepted:
-        return problem.known, ()
-    estimator, floor = problem.estimator, problem.limits.floor * problem.blocks
-    # The null distribution of what is left at the end; earlier ones are of what was left then.
-    steps, best, null = list(accepted), accepted[-1].model, accepted[-1].null_95
-    rivals = {step.effect: step for stage in tried for step in stage[:RUNNERS_UP]}
-    for number, step in enumerate(accepted if len(accepted) > 1 else ()):
-        rest = [e for e in best.effects if e != step.effect]
-        swap = _swapped(problem, best, rest, list(rivals.values()), best.cost - null)
+    steps, model = dict(enumerate(chain.steps)), chain.model
+    rivals = {step.effect: step for stage in tried for step in stage[:RIVALS]}
+    for number, step in enumerate(chain.steps):
+        rest = [s.effect for s in steps.values() if s is not step]
+        here = problem.under(model, rest)
+        found = _judged(here, model, rest, step)
+        swap = _swapped(here, found, rest, list(rivals.values())) if rest else None
         if swap is not None:
-            best, steps[number] = swap.model, replace(swap, stage=step.stage)
-            continue
-        without = estimator.fit(rest, best.values, tolerated=best.tolerated)
-        if without.cost < best.cost + null or without.excess_energy < floor:
-            best, steps[number] = without, replace(step, effect="")
-    found = estimator.fit(best.effects, best.values)
-    if any(BY_ID[effect].search for effect in found.effects):
-        found = estimator.searched(found)
-    return found, tuple(step for step in steps if step.effect)
+            steps[number], model = replace(swap, stage=step.stage), swap.model
+        elif found.gain < PRICE or not proved(found):
+            del steps[number]
+            model = found.base
+        else:
+            steps[number], model = replace(found, stage=step.stage), found.model
+    kept = tuple(steps.values())
+    estimator = problem.under(model).estimator
+    model = estimator.fit([step.effect for step in kept], model.values)
+    if any(BY_ID[effect].search for effect in model.effects):
+        model = estimator.searched(model)
+    return model, kept
 
 
-def _swapped(
-    problem: Problem, best: Model, rest: Sequence[str], rivals: Sequence[Step], least: float
-) -> Step | None:
-    """Return the step to the first rival in an effect's place that costs less than ``least`` and proves itself."""
+def _judged(problem: Problem, model: Model, rest: Sequence[str], step: Step) -> Step:
+    """Return an effect's step on top of all others."""
+    estimator = problem.estimator
+    base = estimator.fit(rest, model.values)
+    whole = estimator.fit((*rest, step.effect), model.values)
+    return judged(problem, step_of(estimator, step.effect, base, whole))
+
+
+def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequence[Step]) -> Step | None:
+    """Return the step of the first rival that gains more in an effect's place, and proves itself."""
     estimator = problem.estimator
     for other in rivals:
-        if other.effect in best.effects:
+        if other.effect in found.model.effects:
             continue
-        values = {**best.values, **other.model.values}
-        swapped = estimator.fit((*rest, other.effect), values, tolerated=best.tolerated)
-        if swapped.cost < least and is_worthwhile(swapped, other.effect):
-            without = estimator.fit(rest, best.values, tolerated=best.tolerated)
-            step = judged(problem, step_of(estimator, other.effect, without, swapped))
-            if proved(step):
+        values = {**found.model.values, **other.model.values}
+        swapped = estimator.fit((*rest, other.effect), values)
+        if swapped.cost < found.model.cost - found.null_95:
+            step = judged(problem, step_of(estimator, other.effect, found.base, swapped))
+            if proved(step) and not stopped(step):
                 return step
     return None
 
@@ -220,7 +245,3 @@ def _with_clocks(problem: Problem, model: Model, stage: Sequence[Step]) -> Probl
     common = max((step.gain for step in stage if step.effect == COMMON_DELAY), default=0.0)
     least = max(CLOCKS_FIRST * stage[0].gain, CLOCKS_OVER_COMMON * common) if stage else 0.0
     return problem.with_clocks(model, least)
-
-
-def _worth_fitting(problem: Problem, model: Model) -> bool:
-    return model.excess_energy > problem.limits.least_drop * problem.blocks

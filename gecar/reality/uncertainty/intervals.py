@@ -79,7 +79,7 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
     spans = gain_intervals(estimator, model)
     for k, (left, right) in walked_quantiles(estimator, model, seed).items():
         spans[k] = (max(float(model.z[k]) - left, 0.0), max(right - float(model.z[k]), 0.0))
-    everything, residual = np.arange(len(model.z)), estimator.residual(model.parameters, model.tolerated)
+    everything, residual = np.arange(len(model.z)), estimator.residual(model.parameters)
     for k, (c, half) in enumerate(
         zip(model.parameters.coordinates, half_widths(estimator, model), strict=True)
     ):

@@ -41,7 +41,7 @@ def _walk(estimator: Estimator, model: Model, seed: int) -> Array:
     """Return where a Metropolis walk went, shape (steps, coordinates)."""
     rng, residual = (
         np.random.default_rng((seed, len(model.errors))),
-        estimator.residual(model.parameters, model.tolerated),
+        estimator.residual(model.parameters),
     )
     low, high = model.parameters.bounds
     count = len(model.z)

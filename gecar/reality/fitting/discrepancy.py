@@ -1,0 +1,116 @@
+"""Model discrepancy: what a simulation is off by even where nothing worth a name is missing.
+
+No robot is its file: its constants are off a little, and there is always some small physics that nobody listed. Both
+are part of the noise here, so that an effect is named only where it stands out of them.
+
+*Small changes.* Every parameter of the catalogue may be off by a small normal number, in sizes worth a name. Integrated
+out, these changes are correlated noise of covariance 1 + G G', where the columns of G are their sensitivities times its
+standard deviation; residuals are multiplied by its inverse root. An effect can then gain no more than what its size
+costs as a small change, and an imitation gains less than the small changes it imitates.
+
+*Physics in no list.* What even large changes of all parameters together leave is as good as the model gets. By it the
+variance of each channel is scaled: the Birge ratio, over half-second spans, so that what lasts counts as lasting.
+
+Sources: Kennedy and O'Hagan, J. R. Statistical Society B 63 (2001) 425 (discrepancy); George and McCulloch, J. American
+Statistical Association 88 (1993) 881 (small against free coefficients); Birge, Physical Review 40 (1932) 207; Golub and
+Van Loan, Matrix Computations (4th ed.), ch. 2.4 (singular values), 6.1 (ridge), 6.3 (constraints).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.replay.channels import CHANNELS
+
+Array = npt.NDArray[np.float64]
+
+ROUNDS = 3  # of weights and ratios, each from what the others leave
+CLIP = 30.0  # standard deviations
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """A model's discrepancy as noise: whitens residuals.
+
+    Attributes
+    ----------
+    scale
+        One over the root of each residual's variance, shape (n,).
+    root_weight
+        Root of each residual's weight, shape (n,): what no small change explains shall not bend them.
+    basis, spread, back
+        Singular vectors and values of the scaled, weighted sensitivities, shapes (n, k), (k,) and (k, changes).
+    ratios
+        Variance of each channel over its sensors' noise, shape (channels,).
+    small
+        Standard deviation of small changes, in sizes worth a name.
+    """
+
+    scale: Array
+    root_weight: Array
+    basis: Array
+    spread: Array
+    back: Array
+    ratios: Array
+    small: float
+
+    def whitened(self, errors: Array) -> Array:
+        """Return residuals of unit variance, shape (n,) or (m, n), from those in units of the sensors' noise."""
+        scaled = errors * self.scale
+        inside = (scaled * self.root_weight) @ self.basis
+        shrunk = inside * (1.0 - 1.0 / np.sqrt(1.0 + self.spread**2))
+        out: Array = scaled - (shrunk @ self.basis.T) / self.root_weight
+        return out
+
+    def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
+        """Return the most likely small changes within bounds, in sizes worth a name, shape (changes,)."""
+        inside = (errors * self.scale * self.root_weight) @ self.basis
+        rows = np.vstack([self.spread[:, None] * self.back, np.eye(self.back.shape[1])])
+        asked = -np.r_[inside, np.zeros(self.back.shape[1])]
+        found: Array = self.small * lsq_linear(rows, asked, (low / self.small, high / self.small)).x
+        return found
+
+
+def discrepancy(
+    slopes: Array, errors: Array, blocks: Blocks, channel: npt.NDArray[np.int32], small: float, large: float
+) -> Discrepancy:
+    """Return the discrepancy of a model.
+
+    Parameters
+    ----------
+    slopes
+        Derivatives of its residuals by every small change, in sizes worth a name, shape (n, changes).
+    errors
+        Its residuals, in units of the sensors' noise, shape (n,).
+    blocks
+        How they are grouped.
+    channel
+        Of each, shape (n,).
+    small, large
+        Standard deviation of small changes, and of those whose remainder is physics in no list.
+    """
+    ratios, weight = np.ones(len(CHANNELS)), np.ones(len(errors))
+    for _ in range(ROUNDS):
+        scale = 1.0 / np.sqrt(ratios[channel])
+        basis, spread, _ = _decomposed(slopes, scale, weight, large)
+        inside = (errors * scale * weight) @ basis
+        left = errors * scale - (basis @ (inside * spread**2 / (1.0 + spread**2))) / weight
+        weight = np.sqrt(weights(left))
+        ratios = np.maximum(blocks.variances(np.clip(left, -CLIP, CLIP)) * ratios, 1.0)
+    scale = 1.0 / np.sqrt(ratios[channel])
+    return Discrepancy(scale, weight, *_decomposed(slopes, scale, weight, small), ratios, small)
+
+
+def _decomposed(slopes: Array, scale: Array, weight: Array, size: float) -> tuple[Array, Array, Array]:
+    """Return singular vectors and values of sensitivities to changes of a size, by way of their small Gram matrix."""
+    columns = slopes * (size * scale * weight)[:, None]
+    squares, back = np.linalg.eigh(columns.T @ columns)
+    felt = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1.0)
+    spread, back = np.sqrt(squares[felt]), back[:, felt]
+    return columns @ (back / spread), spread, back.T

@@ -1,0 +1,190 @@
+"""How far two robots part under the same commands, and how far a robot parts from what was measured."""
+
+from __future__ import annotations
+
+import statistics
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.materiality import Size, largest
+from gecar.reality.noise.sensor_noise import PATH_CAUTION
+from gecar.reality.recordings.dead_reckoning import integrated
+from gecar.reality.replay.kernel import HEADING, X, Y
+from gecar.reality.replay.odometry import smoothed_rows
+from gecar.reality.replay.smoothed_path import measured_path
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.residuals.of_recording import RecordingResiduals
+
+Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
+Rows = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+
+METRE = 1.0
+SPOT_M = 0.15  # about a spot on the floor
+APART_M = 0.25  # how far windows of a metre begin from each other
+
+
+class _Noise(NamedTuple):
+    """Standard deviations of a smoothed path [m, rad]."""
+
+    place: float
+    heading: float
+
+
+QUIET = _Noise(0.0, 0.0)
+PATH_KNOWN = np.array(
+    [0.003, 0.003, 0.01]
+)  # to which a camera, its lens and its mount tell a path [m, m, rad]
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much it matters what robots differ by, under the commands of some recordings.
+
+    Attributes
+    ----------
+    runs
+        The recordings; their readings are compared along their paths, where they have any.
+    sensor
+        Whether the colour sensor counts, or else the motion.
+    """
+
+    runs: tuple[RecordingResiduals, ...]
+    sensor: bool
+
+    def of(self, residuals: Residuals) -> Sizes:
+        """Return the sizes under the commands of other recordings."""
+        return Sizes(residuals.recordings, residuals.sensor)
+
+    def apart(self, one: Physics, other: Physics) -> Size:
+        """Return how far two robots part, in the recording where that is most; physics records of shape (1,)."""
+        of = _reading_apart if self.sensor else _apart
+        return largest([of(run, one, other) for run in self.runs])
+
+    def left(self, physics: Physics) -> Size:
+        """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
+
+        Where a motor hardly overcomes friction, nothing is known well: one such recording shall not decide.
+        """
+        of = _reading_left if self.sensor else _left
+        return largest([of(run, physics) for run in self.runs], statistics.median)
+
+    def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
+        """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
+
+        What only one of several recordings shows there is that recording's, not the spot's.
+        """
+        passing = [size for run in self.runs if (size := _left(run, physics, spot)) != Size()]
+        return Size() if len(passing) < min(2, len(self.runs)) else largest(passing, statistics.median_low)
+
+
+def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
+    (path, wheels), (other_path, other_wheels) = _simulated(run, one), _simulated(run, other)
+    track = float(one["track_width"][0])
+    poses = _parting(_seen(run, path, one), _seen(run, other_path, other), wheels, track, QUIET)
+    return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
+
+
+def _left(run: RecordingResiduals, physics: Physics, spot: tuple[float, float] | None = None) -> Size:
+    out, track = Size(), float(physics["track_width"][0])
+    path, wheels = _simulated(run, physics)
+    if run.replayer.has_poses:
+        place, _, heading = run.noise.path_sd / PATH_CAUTION
+        noise = _Noise(float(place), float(heading))
+        seen = measured_path(run.replayer, physics)
+        if spot is not None:
+            near = np.hypot(seen[:, 0] - spot[0], seen[:, 1] - spot[1]) < SPOT_M
+            return _parting(path, seen, wheels, track, noise, near)
+        out = out.or_more(_parting(path, seen, wheels, track, noise))
+    measured = ~np.isnan(run.replayer.measured[:, :2]).all(axis=0)
+    if run.recording.setup.rig == "bench":
+        simulated = run.replayer.open_loop().play(physics).rows
+        for side in np.flatnonzero(measured):
+            way, counted = (_rolled(run, physics, a[:, side]) for a in (simulated, run.replayer.measured))
+            out = out.or_more(_parting(way, counted, way, track, QUIET))
+    elif measured.all():
+        counted = _reckoned(run, physics, run.replayer.measured)
+        out = out.or_more(_parting(wheels, counted, wheels, track, QUIET))
+    return out
+
+
+def _reading_apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
+    return Size(reading_pct=_root_mean((run.readings(one) - run.readings(other)) ** 2))
+
+
+def _reading_left(run: RecordingResiduals, physics: Physics) -> Size:
+    errors = run.recording.reflection_pct - run.readings(physics)
+    return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, PATH_KNOWN) ** 2))
+
+
+def _simulated(run: RecordingResiduals, physics: Physics) -> tuple[Array, Array]:
+    """Return the path of the axle's centre, and the one that its wheels tell, shape (rows, 3) each."""
+    rows = run.replayer.open_loop().play(physics).rows
+    return rows[:, [X, Y, HEADING]], _reckoned(run, physics, rows)
+
+
+def _seen(run: RecordingResiduals, path: Array, physics: Physics) -> Array:
+    """Return a path as a late camera reports it, shape (rows, 3)."""
+    late = run.replayer.t - float(physics["pose_delay"][0])
+    return np.stack([np.interp(late, run.replayer.t, column) for column in path.T], axis=1)
+
+
+def _reckoned(run: RecordingResiduals, physics: Physics, angles: Array) -> Array:
+    """Return a path by dead reckoning from wheel angles [rad]: columns 0 and 1."""
+    p, t = physics[0], run.replayer.t
+    rolled = np.column_stack([smoothed_rows(angles[:, k], t) for k in range(2)]) * p["wheel_radius"]
+    moved = np.diff(rolled, axis=0)
+    ahead, turn = moved.mean(axis=1), (moved[:, 1] - moved[:, 0]) / p["track_width"]
+    return integrated(ahead, np.zeros(len(ahead)), turn, np.zeros(3))
+
+
+def _rolled(run: RecordingResiduals, physics: Physics, angle: Array) -> Array:
+    """Return the way a wheel on a bench would roll, shape (rows, 3)."""
+    way = smoothed_rows(angle, run.replayer.t) * float(physics["wheel_radius"][0])
+    return np.column_stack([way, np.zeros((len(way), 2))])
+
+
+def _parting(
+    one: Array, other: Array, wheels: Array, track_m: float, noise: _Noise, near: Mask | None = None
+) -> Size:
+    """Return how far two paths part, over windows of a metre and as a whole; or over windows with certain rows."""
+    moved = np.r_[0.0, np.cumsum(np.hypot(*np.diff(wheels[:, :2], axis=0).T))]
+    turned = np.r_[0.0, np.cumsum(np.abs(np.diff(wheels[:, 2])))] * 0.5 * track_m
+    way = np.maximum(moved, turned)
+    begins = np.arange(0.0, max(way[-1] - METRE, 0.0) + 1e-9, APART_M)
+    first = np.searchsorted(way, begins)
+    last = np.minimum(np.searchsorted(way, begins + METRE), len(way) - 1)
+    if near is not None:
+        passed = np.r_[0, np.cumsum(near)]
+        inside = passed[last] > passed[first]
+        return Size(*_beyond(one, other, first[inside], last[inside], noise)) if inside.any() else Size()
+    mm_1m, deg_1m = _beyond(one, other, first, last, noise)
+    mm_drive, deg_drive = _beyond(one, other, np.array([0]), np.array([len(way) - 1]), noise)
+    return Size(mm_1m, deg_1m, mm_drive, deg_drive)
+
+
+def _beyond(one: Array, other: Array, first: Rows, last: Rows, noise: _Noise) -> tuple[float, float]:
+    """Return the parting [mm, deg] from some rows to others, root mean square, less noise."""
+    a, b = _relative(one, first, last), _relative(other, first, last)
+    far = np.sum(a[:, :2] ** 2, axis=1)
+    place = np.sum((a - b)[:, :2] ** 2, axis=1) - 4.0 * noise.place**2 - far * noise.heading**2
+    turn = (a[:, 2] - b[:, 2]) ** 2 - 2.0 * noise.heading**2
+    return 1e3 * _root_mean(place), float(np.degrees(_root_mean(turn)))
+
+
+def _relative(path: Array, first: Rows, last: Rows) -> Array:
+    """Return the pose at some rows as seen from the pose at others, shape (windows, 3)."""
+    move, heading = path[last] - path[first], path[first, 2]
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack(
+        [move[:, 0] * cos + move[:, 1] * sin, move[:, 1] * cos - move[:, 0] * sin, move[:, 2]], axis=1
+    )
+
+
+def _root_mean(squares: Array) -> float:
+    there = squares[~np.isnan(squares)]
+    return float(np.sqrt(max(float(np.mean(there)), 0.0))) if len(there) else 0.0

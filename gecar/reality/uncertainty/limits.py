@@ -1,0 +1,117 @@
+"""Limits: the smallest size of each effect that recordings would have shown, as upper limits are given in physics.
+
+An effect of a certain size is added to the robot found. What that changes in the recordings' residuals, beside small
+changes of all constants and in units of the noise, is what it would gain: half its square, give or take a normal number
+times its root. The limit is the size at which that passes the price of a name in 95 of 100 cases, and which is worth a
+name and material.
+
+Sources: Feldman and Cousins, Physical Review D 57 (1998) 3873 (sensitivity: the limit where nothing is there); the
+noncentral chi-square of a matched filter, Kay, Fundamentals of Statistical Signal Processing II (1998), ch. 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.initial_values import initial_values
+from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import Coordinate, Parameters, free
+from gecar.reality.optimisation.least_squares import costs
+from gecar.reality.selection.acceptance import worthwhile
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.thresholds import PRICE
+from gecar.reality.verdict import Limit
+from gecar.world.effects import BY_ID
+
+Array = npt.NDArray[np.float64]
+
+SIZES = np.geomspace(1.0, 60.0, 12)  # in sizes worth a name; more than any bound
+SURE = 1.645  # 95 % quantile of a normal distribution
+NEEDED = np.sqrt(2.0 * PRICE) + SURE
+MARGIN = 1.15  # on the size: what a limit is computed with is a little off, too
+
+
+def limits(problem: Problem, model: Model) -> dict[str, Limit | None]:
+    """Return the limit of every effect of a problem that a model does not hold; None where any size would pass unseen.
+
+    Parameters
+    ----------
+    problem, model
+        The problem, under the discrepancy the model leaves.
+    """
+    return {
+        effect: _limit(problem, model, effect) for effect in problem.catalogue if effect not in model.effects
+    }
+
+
+def _limit(problem: Problem, model: Model, effect: str) -> Limit | None:
+    parameters = free(problem.estimator.robot, (*model.effects, effect))
+    start = _shape(problem, model, parameters, effect)
+    found = [_smallest(problem, parameters, start, k, side) for k, side in _directions(parameters, effect)]
+    seen = [size for size in found if size is not None]
+    if not seen or len(seen) < len(found):
+        return None
+    first = max(seen, key=lambda pair: pair[0])
+    coordinate, value = first[1], first[2]
+    size = value if coordinate.inverse else abs(value - coordinate.neutral)
+    return Limit(float(size), coordinate.parameter.unit)
+
+
+def _directions(parameters: Parameters, effect: str) -> list[tuple[int, float]]:
+    """Return the coordinate of an effect's first size, and on which sides of neutral it may lie."""
+    k = next(k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect)
+    low, high = parameters.bounds
+    return [(k, side) for side, room in ((1.0, high[k]), (-1.0, -low[k])) if room > SIZES[0]]
+
+
+def _shape(problem: Problem, model: Model, parameters: Parameters, effect: str) -> Array:
+    """Return a model's coordinates with an effect's shape as searches would begin with it, and no size."""
+    values: Mapping[str, float] = {}
+    if any(p.worthwhile == 0.0 for p in BY_ID[effect].parameters[1:]):
+        trial = problem.estimator.trial(model, effect)
+        values = next(iter(initial_values(effect, problem.estimator.robot, problem.recordings, trial)), {})
+    return parameters.vector({**model.values, effect: values})
+
+
+def _smallest(
+    problem: Problem, parameters: Parameters, start: Array, k: int, side: float
+) -> tuple[float, Coordinate, float] | None:
+    """Return the smallest size on one side that would be named: in sizes worth a name, its coordinate, its value."""
+    coordinate, (low, high) = parameters.coordinates[k], parameters.bounds
+    scale = 1.0 if not coordinate.inverse else high[k] / SIZES[-1]
+    vectors = np.tile(start, (len(SIZES) + 1, 1))
+    vectors[:, k] = np.clip(side * scale * np.r_[0.0, SIZES], low[k], high[k])
+    none, *some = problem.estimator.residual(parameters)(vectors)
+    shown = np.array([_shown(errors - none) for errors in some])
+    enough = np.flatnonzero(shown >= NEEDED)
+    if not len(enough):
+        return None
+    for n in range(int(enough[0]), len(SIZES)):
+        if worthwhile(parameters, vectors[n + 1], coordinate.effect.id) and _material(
+            problem, parameters, vectors[0], vectors[n + 1]
+        ):
+            z = side * scale * _between(shown, n) if n == enough[0] else vectors[n + 1, k]
+            z = float(np.clip(MARGIN * z, low[k], high[k]))
+            return abs(z), coordinate, coordinate.value(z)
+    return None
+
+
+def _between(shown: Array, n: int) -> float:
+    """Return the size at which enough shows, between the n-th of `SIZES` and the one before."""
+    if n == 0 or shown[n] <= shown[n - 1]:
+        return float(SIZES[n])
+    share = np.log(NEEDED / max(shown[n - 1], 1e-9)) / np.log(shown[n] / max(shown[n - 1], 1e-9))
+    return float(SIZES[n - 1] * (SIZES[n] / SIZES[n - 1]) ** np.clip(share, 0.0, 1.0))
+
+
+def _shown(change: Array) -> float:
+    """Return how far two robots' residuals part, in standard deviations; large residuals count as in costs."""
+    return float(np.sqrt(2.0 * np.sum(costs(change))))
+
+
+def _material(problem: Problem, parameters: Parameters, without: Array, with_it: Array) -> bool:
+    size = problem.sizes.apart(parameters.physics(without), parameters.physics(with_it))
+    return problem.material.times(size) >= 1.0

@@ -1,0 +1,138 @@
+"""What a simulation is off by where nothing worth a name is missing: small changes, and physics in no list."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_case import EV3, bumps, linear, linear_problem
+from test_discovery import recorded
+
+from gecar.cli.commands.discover import discover as command
+from gecar.errors import InputError
+from gecar.reality.discovery import discover
+from gecar.reality.fitting.discrepancy import discrepancy
+from gecar.reality.materiality import Material, Size
+from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Case, Recording, write_recording
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.parting import Sizes
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.stepwise import explain
+from gecar.reality.selection.thresholds import LARGE, SMALL
+
+FOUR = ("viscous_friction", "rotor_inertia", "track_width", "wheel_radius")
+RESPONSES = {effect: bumps(seed, 4, 1.0) for seed, effect in enumerate(FOUR, start=1)}
+SLOPES = np.stack(list(RESPONSES.values()), axis=1)
+INDEX = linear({}, RESPONSES).index
+BLOCKS = Blocks(INDEX)
+
+
+def test_small_changes_are_noise_of_unit_variance_and_so_is_their_sum_with_noise() -> None:
+    rng, drawn = np.random.default_rng(0), []
+    for _ in range(300):
+        errors = rng.normal(size=len(SLOPES)) + SLOPES @ rng.normal(0.0, SMALL, len(FOUR))
+        if not drawn:
+            made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, SMALL, LARGE)
+            made = replace(made, root_weight=np.ones(len(errors)))
+        drawn.append(made.basis.T @ made.whitened(errors))
+    assert np.std(drawn, axis=0) == pytest.approx(np.ones(len(FOUR)), abs=0.15)
+
+
+def test_small_changes_are_told_within_their_bounds() -> None:
+    true = np.array([0.4, -0.3, 0.0, 5.0])
+    errors = np.random.default_rng(0).normal(size=len(SLOPES)) - SLOPES @ true
+    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, SMALL, LARGE)
+    found = made.small_changes(errors, np.full(4, -10.0), np.full(4, 10.0))
+    assert found == pytest.approx(true, abs=0.1)
+    kept = made.small_changes(errors, np.full(4, -1.0), np.array([1.0, 0.0, 1.0, 1.0]))
+    assert kept[3] == pytest.approx(1.0)
+    assert np.all(kept <= [1.0, 1e-9, 1.0, 1.0])
+
+
+def test_physics_in_no_list_makes_a_channel_as_noisy_as_it_leaves_it() -> None:
+    unlisted = bumps(9, 4, 2.0)
+    noise = np.random.default_rng(0).normal(size=len(unlisted))
+    made, none = (
+        discrepancy(SLOPES, e, BLOCKS, INDEX.channel, SMALL, LARGE) for e in (noise + unlisted, noise)
+    )
+    assert made.ratios[0] == pytest.approx(
+        1.0 + 50 * np.mean(unlisted**2) * 0.7, rel=0.3
+    )  # spans of 50 samples
+    assert none.ratios[0] < 1.3
+
+
+def test_many_small_changes_name_nothing() -> None:
+    explained = explain(linear_problem(linear({"viscous_friction": 0.6, "rotor_inertia": -0.5}, RESPONSES)))
+    assert explained.steps == ()
+    assert not explained.unexplained
+
+
+def test_an_effect_beside_small_changes_and_unlisted_physics_is_named_alone() -> None:
+    case = linear({"viscous_friction": 0.6, "rotor_inertia": -0.5, "track_width": 4.0}, RESPONSES)
+    case = replace(case, noise=case.noise + bumps(9, 4, 0.3))
+    explained = explain(linear_problem(case))
+    assert [step.effect for step in explained.steps] == ["track_width"]
+    assert explained.taken.z == pytest.approx([4.0], abs=0.2)
+    assert not explained.unexplained
+
+
+def sizes_of(runs: list[Recording]) -> Sizes:
+    noise = estimate_noise(runs, EV3.physics, 1.0)
+    return Sizes(motion_residuals(runs, noise, 1.0, Threads(1)).recordings, sensor=False)
+
+
+def test_sizes_are_millimetres_and_degrees_that_anybody_can_check() -> None:
+    runs = [recorded(EV3, seed) for seed in range(3)]
+    sizes, known = sizes_of(runs), EV3.physics
+    narrow = EV3.with_effects({"track_width": {"scale": 0.97}}).physics
+    left, apart = sizes.left(known), sizes.apart(known, narrow)
+    assert left.mm_1m < 2.0
+    assert left.deg_1m < 0.3
+    # Half a track of 60 mm: a metre of spinning on the spot is 16.7 rad, of which 3 % are 28.6 degrees.
+    assert 3.0 < apart.deg_1m < 28.7
+    assert 3.0 < sizes.left(narrow).deg_1m <= 1.1 * apart.deg_1m
+
+
+def test_what_is_material_is_so_by_any_of_its_units() -> None:
+    line = Material(5.0)
+    assert line.times(Size(mm_1m=5.0)) == pytest.approx(1.0)
+    assert line.times(Size(deg_1m=2.0)) == pytest.approx(2.0)
+    assert line.times(Size(mm_drive=10.0, reading_pct=7.5)) == pytest.approx(3.0)
+    assert Material(10.0).times(Size(deg_1m=2.0)) == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def nothing():
+    return discover(Case("made", tuple(recorded(EV3, seed) for seed in range(5))))
+
+
+@pytest.mark.parametrize(("effect", "label"), [("track_width", "scale"), ("actuation_delay", "time_s")])
+def test_an_effect_of_the_size_of_its_limit_is_found(nothing, effect: str, label: str) -> None:
+    limit = nothing.limits[effect]
+    neutral = 1.0 if label == "scale" else 0.0
+    robot = EV3.with_effects({effect: {label: neutral + limit.size}})
+    verdict = discover(Case("made", tuple(recorded(robot, seed) for seed in range(5))))
+    assert [found.id for found in verdict.effects] == [effect]
+
+
+def test_of_a_sensor_that_read_nothing_nothing_is_known(nothing) -> None:
+    assert nothing.limits["sensor_delay"] is None
+    assert nothing.as_json()["limits"]["sensor_delay"] is None
+    assert "sensor_delay" in str(nothing).split("say nothing: ")[1]
+    assert not nothing.residual.material
+
+
+def test_what_matters_may_be_chosen(nothing, tmp_path) -> None:
+    robot = EV3.with_effects({"actuation_delay": {"time_s": 0.03}})
+    runs = [recorded(robot, seed, seconds=5.0) for seed in range(3)]
+    for run in runs:
+        write_recording(run, tmp_path / f"{run.name}.csv")
+    verdict = discover(Case("made", tuple(runs)), material=Material(1000.0))
+    assert verdict.verdict == "nothing"
+    assert [minor.id for minor in verdict.minor] == ["actuation_delay"]
+    assert verdict.as_json()["minor"][0]["moves"]["mm"] > 1.0
+    with pytest.raises(InputError, match="--material: found 0"):
+        command([tmp_path], material=0.0)
