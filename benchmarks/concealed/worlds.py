@@ -32,7 +32,33 @@ class Truth(Protocol):
         turn_ticks: int = ROW_TICKS,
         ended: Callable[[float, float], bool] | None = None,
     ) -> History:
-        """Drive from rest."""
+        """Drive from rest.
+
+        Parameters
+        ----------
+        start
+            Pose of the axle's centre [m, m, rad].
+        controller
+            From time [s] and sensor reading [%] to left and right duty [%]; ``None`` ends the run.
+        seconds
+            Length of the run by the brick's clock [s].
+        reading_noise
+            Noise on the sensor's reading per tick (n,) [%], before rounding.
+        turn_ticks
+            Ticks between two turns of the controller.
+        ended
+            From the axle's place [m] to whether the run is over; asked whenever the controller is.
+
+        Returns
+        -------
+        History
+            One entry per tick, the first before anything moved.
+
+        Raises
+        ------
+        ToppledError
+            If the robot falls over: it leans by more than 20 degrees, or a wheel or the caster stays in the air.
+        """
         ...
 
 

@@ -25,7 +25,7 @@ from gecar.reality.invent.formula import Formula, describe
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
-from gecar.reality.materiality import DEFAULT, Material, Size, largest
+from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
 from gecar.reality.prove.holdout import Contender, judge
@@ -313,7 +313,7 @@ def _what_is_left(
         context.robot.with_effects(v)
         for v in (motion.taken.values, motion.problem.small_changes(motion.taken))
     )
-    size = replace(largest([each.left for each in parts]), arrival_s=context.arrival_apart_s(*apart))
+    size = replace(combined([each.left for each in parts]), arrival_s=context.arrival_apart_s(*apart))
     material = any(each.unexplained for each in parts)
     return Residual(white, p, size, material, "; ".join(map(str, described)) or None, gained)
 

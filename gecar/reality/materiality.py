@@ -31,17 +31,19 @@ class Size:
 
     def or_more(self, other: Size) -> Size:
         """Return the larger of two, number by number."""
-        return largest([self, other])
+        return combined([self, other])
 
 
-def largest(sizes: Sequence[Size], of: Callable[[list[float]], float] = max) -> Size:
-    """Return sizes put together, number by number; `arrival_s` is left out."""
+def combined(sizes: Sequence[Size], of: Callable[[list[float]], float] = max) -> Size:
+    """Return the largest of each number of several sizes, or their median, say; `arrival_s` is left out."""
+    if not sizes:
+        return Size()
     names = [f.name for f in fields(Size) if f.name != "arrival_s"]
-    return (
-        Size(**{name: float(of([getattr(size, name) for size in sizes])) for name in names})
-        if sizes
-        else Size()
-    )
+    return Size(**{name: float(of([getattr(size, name) for size in sizes])) for name in names})
+
+
+MM_A_DEGREE, MM_A_PERCENT = 5.0, 2.0  # as far off
+DRIVE = 4.0  # a drive of 12 s is about 4 m
 
 
 @dataclass(frozen=True)
@@ -77,5 +79,3 @@ class Material:
 
 
 DEFAULT = Material()
-MM_A_DEGREE, MM_A_PERCENT = 5.0, 2.0
-DRIVE = 4.0  # a drive of 12 s is about 4 m

@@ -208,8 +208,7 @@ class Verdict:
 
     def __str__(self) -> str:
         """Return the verdict in words."""
-        words = _above("report.verdict")
-        return "\n\n".join([*words.sentences(self), *words.limits(self)])
+        return "\n\n".join(_above("report.verdict").words(self))
 
     def _repr_html_(self) -> str:
         """Return the verdict as a notebook shows it: words, tables, and how much of the gap is closed."""

@@ -15,6 +15,11 @@ CHANNEL_WORDS = {
 }  # fmt: skip
 
 
+def words(verdict: Verdict) -> list[str]:
+    """Say a verdict, and what the recordings could have shown, a sentence or two a paragraph."""
+    return [*sentences(verdict), *limits(verdict)]
+
+
 def sentences(verdict: Verdict) -> list[str]:
     """Say a verdict, a sentence or two a paragraph."""
     out = [_headline(verdict)]

@@ -4,7 +4,8 @@ Eq. 1 is the time of one drive, in a simulation whose step, start and robot are 
 programs that owe their time to those digits and leave the course elsewhere: the reality gap of Jakobi (1997), and what
 Koos, Mouret and Doncieux (IEEE T-EC 17(1), 2013) call transferability. Here a program is driven under conditions drawn
 anew in every generation (`gecar.world.perturbation`). What counts is a chance-constrained quantile of eq. 1: the median
-time to GOAL, if the required share of all its drives so far arrives, and 10^4 if not. Programs met again in later
+time to GOAL, or the nominal drive's where that is longer, if the required share of all its drives so far arrives, and
+10^4 if not. Programs met again in later
 generations are driven again, so that luck does not last.
 """
 
@@ -179,19 +180,17 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
     world's own) come before those that owe their time to one step; of those as good, the shortest is taken.
     """
     at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
-    unsteady = at_steps.max(axis=1) > STEADY * at_steps.min(axis=1)
+    slowest = at_steps.max(axis=1)
+    unsteady = slowest > STEADY * at_steps.min(axis=1)
     first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
-    order = np.lexsort(
-        (np.maximum([merit_of(times, share) for times in first], at_steps.max(axis=1)), unsteady)
-    )
+    order = np.lexsort((np.maximum([merit_of(times, share) for times in first], slowest), unsteady))
     left = order[: max(1, (len(order) + 3) // 4)].tolist()
     second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1))
     both = [
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)
     ]
-    slowest = at_steps[left].max(axis=1)
-    merits, last = np.maximum([merit_of(times, share) for times in both], slowest), unsteady[left]
+    merits, last = np.maximum([merit_of(times, share) for times in both], slowest[left]), unsteady[left]
     best = np.lexsort((merits, last))[0]
     as_good = np.flatnonzero((merits <= AS_GOOD * merits[best]) & (last == last[best]))
     return int(left[min(as_good, key=lambda k: (len(programs[left[k]]), merits[k]))])

@@ -38,33 +38,7 @@ class Truth:
         turn_ticks: int = ROW_TICKS,
         ended: Callable[[float, float], bool] | None = None,
     ) -> History:
-        """Drive from rest.
-
-        Parameters
-        ----------
-        start
-            Pose of the axle's centre [m, m, rad].
-        controller
-            From time [s] and sensor reading [%] to left and right duty [%]; ``None`` ends the run.
-        seconds
-            Length of the run by the brick's clock [s].
-        reading_noise
-            Noise on the sensor's reading per tick (n,) [%], before rounding.
-        turn_ticks
-            Ticks between two turns of the controller.
-        ended
-            From the axle's place [m] to whether the run is over; asked whenever the controller is.
-
-        Returns
-        -------
-        History
-            One entry per tick, the first before anything moved.
-
-        Raises
-        ------
-        ToppledError
-            If a wheel or the caster stays in the air.
-        """
+        """Drive from rest, as `benchmarks.concealed.worlds.Truth.run`."""
         count = round(seconds / TICK_S) + 1
         noise = np.zeros(count) if reading_noise is None else reading_noise
         log, seen, shares = History.blank(count), np.zeros((count + turn_ticks, 7)), np.zeros((turn_ticks, 2))

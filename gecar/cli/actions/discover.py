@@ -23,7 +23,7 @@ from gecar.reality.discovery import discover
 from gecar.reality.materiality import Material
 from gecar.reality.recordings.recording import Case
 from gecar.reality.verdict import Verdict
-from gecar.report.verdict import limits, sentences
+from gecar.report.verdict import words
 from gecar.world.robot import Robot, write_robot
 
 
@@ -83,7 +83,7 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     if task.pictures:
         tell("pictures")
         _draw(verdict, out)
-    return Told([*sentences(verdict), *limits(verdict)], table, {})
+    return Told(words(verdict), table, {})
 
 
 def conclude_away(task: Task, tell: Callable[[str], None] = _keep_still) -> Told:

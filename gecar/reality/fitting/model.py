@@ -101,8 +101,3 @@ class Step:
     energy_after: float = 0.0
     stage: int = 0
     holdout_gain: float = np.nan
-
-    @property
-    def drop(self) -> float:
-        """By how much it lowers the excess energy."""
-        return self.energy_before - self.energy_after

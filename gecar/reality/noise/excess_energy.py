@@ -71,9 +71,7 @@ class Blocks:
         energy = self.sums(np.clip(errors, -CLIP, CLIP)) ** 2 / self.samples
         typical = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
-            typical[channel] = max(
-                float(np.median(energy[self._channel == channel])) / CHI_SQUARE_MEDIAN, 1.0
-            )
+            typical[channel] = max(self._typical(energy, channel), 1.0)
         out: Array = np.where(np.isin(self._channel, ENCODERS), 0.0, energy / typical[self._channel] - 1.0)
         return out
 
@@ -116,12 +114,16 @@ class Blocks:
         out = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
             if channel not in WHITE:
-                typical = [np.median(energy[self._channel == channel])]
+                typical = self._typical(energy, channel)
                 change = changes[self._channel[first] == channel]
                 if len(change):
-                    typical.append(np.median(change))
-                out[channel] = np.clip(min(typical) / CHI_SQUARE_MEDIAN, 1.0, LARGEST_INFLATION)
+                    typical = min(typical, float(np.median(change)) / CHI_SQUARE_MEDIAN)
+                out[channel] = np.clip(typical, 1.0, LARGEST_INFLATION)
         return out
+
+    def _typical(self, energy: Array, channel: int) -> float:
+        """Return the energy of a channel's typical (median) block, in variances of its mean, were it noise."""
+        return float(np.median(energy[self._channel == channel])) / CHI_SQUARE_MEDIAN
 
     def _blocks_later(self, lag: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return pairs of blocks of one recording and channel that lie so many blocks apart."""

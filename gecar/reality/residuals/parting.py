@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.materiality import Size, largest
+from gecar.reality.materiality import Size, combined
 from gecar.reality.noise.sensor_noise import PATH_CAUTION
 from gecar.reality.recordings.dead_reckoning import integrated
 from gecar.reality.replay.kernel import HEADING, X, Y
@@ -23,6 +23,7 @@ Physics = npt.NDArray[Any]
 Rows = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
+PLACE = [X, Y, HEADING]
 METRE = 1.0
 SPOT_M = 0.15  # about a spot on the floor
 APART_M = 0.25  # how far windows of a metre begin from each other
@@ -63,7 +64,7 @@ class Sizes:
     def apart(self, one: Physics, other: Physics) -> Size:
         """Return how far two robots part, in the recording where that is most; physics records of shape (1,)."""
         of = _reading_apart if self.sensor else _apart
-        return largest([of(run, one, other) for run in self.runs])
+        return combined([of(run, one, other) for run in self.runs])
 
     def left(self, physics: Physics) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
@@ -71,7 +72,7 @@ class Sizes:
         Where a motor hardly overcomes friction, nothing is known well: one such recording shall not decide.
         """
         of = _reading_left if self.sensor else _left
-        return largest([of(run, physics) for run in self.runs], statistics.median)
+        return combined([of(run, physics) for run in self.runs], statistics.median)
 
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
@@ -79,19 +80,21 @@ class Sizes:
         What only one of several recordings shows there is that recording's, not the spot's.
         """
         passing = [size for run in self.runs if (size := _left(run, physics, spot)) != Size()]
-        return Size() if len(passing) < min(2, len(self.runs)) else largest(passing, statistics.median_low)
+        return Size() if len(passing) < min(2, len(self.runs)) else combined(passing, statistics.median_low)
 
 
 def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
-    (path, wheels), (other_path, other_wheels) = _simulated(run, one), _simulated(run, other)
     track = float(one["track_width"][0])
-    poses = _parting(_seen(run, path, one), _seen(run, other_path, other), wheels, track, QUIET)
+    rows, other_rows = _replayed(run, one), _replayed(run, other)
+    wheels, other_wheels = _reckoned(run, one, rows), _reckoned(run, other, other_rows)
+    poses = _parting(_seen(run, rows, one), _seen(run, other_rows, other), wheels, track, QUIET)
     return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
 
 
 def _left(run: RecordingResiduals, physics: Physics, spot: tuple[float, float] | None = None) -> Size:
     out, track = Size(), float(physics["track_width"][0])
-    path, wheels = _simulated(run, physics)
+    rows = _replayed(run, physics)
+    path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
     if run.replayer.has_poses:
         place, _, heading = run.noise.path_sd / PATH_CAUTION
         noise = _Noise(float(place), float(heading))
@@ -102,9 +105,8 @@ def _left(run: RecordingResiduals, physics: Physics, spot: tuple[float, float] |
         out = out.or_more(_parting(path, seen, wheels, track, noise))
     measured = ~np.isnan(run.replayer.measured[:, :2]).all(axis=0)
     if run.recording.setup.rig == "bench":
-        simulated = run.replayer.open_loop().play(physics).rows
         for side in np.flatnonzero(measured):
-            way, counted = (_rolled(run, physics, a[:, side]) for a in (simulated, run.replayer.measured))
+            way, counted = (_rolled(run, physics, a[:, side]) for a in (rows, run.replayer.measured))
             out = out.or_more(_parting(way, counted, way, track, QUIET))
     elif measured.all():
         counted = _reckoned(run, physics, run.replayer.measured)
@@ -121,16 +123,15 @@ def _reading_left(run: RecordingResiduals, physics: Physics) -> Size:
     return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, PATH_KNOWN) ** 2))
 
 
-def _simulated(run: RecordingResiduals, physics: Physics) -> tuple[Array, Array]:
-    """Return the path of the axle's centre, and the one that its wheels tell, shape (rows, 3) each."""
-    rows = run.replayer.open_loop().play(physics).rows
-    return rows[:, [X, Y, HEADING]], _reckoned(run, physics, rows)
+def _replayed(run: RecordingResiduals, physics: Physics) -> Array:
+    """Return what an open-loop replay predicts, one row for each of the recording's."""
+    return run.replayer.open_loop().play(physics).rows
 
 
-def _seen(run: RecordingResiduals, path: Array, physics: Physics) -> Array:
-    """Return a path as a late camera reports it, shape (rows, 3)."""
+def _seen(run: RecordingResiduals, rows: Array, physics: Physics) -> Array:
+    """Return the path of the axle's centre as a late camera reports it, shape (rows, 3)."""
     late = run.replayer.t - float(physics["pose_delay"][0])
-    return np.stack([np.interp(late, run.replayer.t, column) for column in path.T], axis=1)
+    return np.stack([np.interp(late, run.replayer.t, rows[:, k]) for k in PLACE], axis=1)
 
 
 def _reckoned(run: RecordingResiduals, physics: Physics, angles: Array) -> Array:

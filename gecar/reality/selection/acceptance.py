@@ -34,15 +34,11 @@ def worthwhile(parameters: Parameters, z: Array, effect: str) -> bool:
         return any(
             all(found[label] >= size for label, size in worth.items()) for worth in BY_ID[effect].worth
         )
-    low, high = parameters.bounds
-    for k, c in enumerate(parameters.coordinates):
-        if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse):
-            # A cause has a size; what grows until a bound stops it imitates another.
-            at_bound = z[k] != 0.0 and (z[k] > high[k] - AT_BOUND or z[k] < low[k] + AT_BOUND)
-            stopped = at_bound and abs(z[k]) > STOPPED
-            if not stopped and abs(z[k]) >= (LEAST_INVERSE if c.inverse else 1.0):
-                return True
-    return False
+    return any(
+        not _is_stopped(parameters, z, k) and abs(z[k]) >= (LEAST_INVERSE if c.inverse else 1.0)
+        for k, c in enumerate(parameters.coordinates)
+        if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
+    )
 
 
 def is_worthwhile(model: Model, effect: str) -> bool:
@@ -61,14 +57,19 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
 
 
 def stopped(step: Step) -> bool:
-    """Whether any size grew until a bound stopped it: a cause has a size, what has none imitates another."""
+    """Whether any size of a step's model grew until a bound stopped it."""
     parameters, z = step.model.parameters, step.model.z
-    low, high = parameters.bounds
     return any(
-        z[k] != 0.0 and abs(z[k]) > STOPPED and (z[k] > high[k] - AT_BOUND or z[k] < low[k] + AT_BOUND)
+        _is_stopped(parameters, z, k)
         for k, c in enumerate(parameters.coordinates)
         if c.parameter.worthwhile > 0.0 or c.inverse
     )
+
+
+def _is_stopped(parameters: Parameters, z: Array, k: int) -> bool:
+    """Whether a coordinate grew until a bound stopped it: a cause has a size, what has none imitates another."""
+    low, high = (float(bound[k]) for bound in parameters.bounds)
+    return bool(abs(z[k]) > STOPPED and (z[k] > high - AT_BOUND or z[k] < low + AT_BOUND))
 
 
 def proved(step: Step) -> bool:

@@ -79,10 +79,10 @@ def explain(problem: Problem) -> Explanation:
     with_clocks = _with_clocks(known, known.known, first)
     if with_clocks is not None:
         return explain(with_clocks)
-    chain = _forward(problem, first)
+    chain = _forward(known, first)
     if chain.with_clocks is not None:
         return explain(chain.with_clocks)
-    best = _best_chain(problem, [chain, *_other_beginnings(problem, first, chain)])
+    best = _best_chain(problem, [chain, *_other_beginnings(known, first, chain)])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     return concluded(problem, model, steps, tried)
@@ -139,9 +139,9 @@ class _Chain:
 
 
 def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
-    """Go on from a first stage until nothing more proves itself."""
+    """Go on from a first stage until nothing more proves itself; the problem is under what the known robot leaves."""
     model, steps, tried = problem.known, list[Step](), list[tuple[Step, ...]]()
-    here, stage = problem.under(model), tuple(first)
+    here, stage = problem, tuple(first)
     most = int(MOST_ON_BENCH if problem.on_bench else MOST_EFFECTS)
     while True:
         tried.append(stage)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.model import Model
-from gecar.reality.fitting.parameters import Coordinate, Parameters, free
+from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.optimisation.least_squares import costs
 from gecar.reality.selection.acceptance import worthwhile
 from gecar.reality.selection.problem import Problem
@@ -50,21 +50,15 @@ def limits(problem: Problem, model: Model) -> dict[str, Limit | None]:
 def _limit(problem: Problem, model: Model, effect: str) -> Limit | None:
     parameters = free(problem.estimator.robot, (*model.effects, effect))
     start = _shape(problem, model, parameters, effect)
-    found = [_smallest(problem, parameters, start, k, side) for k, side in _directions(parameters, effect)]
-    seen = [size for size in found if size is not None]
+    k = next(k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect)
+    c, low, high = parameters.coordinates[k], *(float(bound[k]) for bound in parameters.bounds)
+    sides = [side for side, room in ((1.0, high), (-1.0, -low)) if room > SIZES[0]]
+    found = [_smallest(problem, parameters, start, k, side) for side in sides]
+    seen = [z for z in found if z is not None]
     if not seen or len(seen) < len(found):
         return None
-    first = max(seen, key=lambda pair: pair[0])
-    coordinate, value = first[1], first[2]
-    size = value if coordinate.inverse else abs(value - coordinate.neutral)
-    return Limit(float(size), coordinate.parameter.unit)
-
-
-def _directions(parameters: Parameters, effect: str) -> list[tuple[int, float]]:
-    """Return the coordinate of an effect's first size, and on which sides of neutral it may lie."""
-    k = next(k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect)
-    low, high = parameters.bounds
-    return [(k, side) for side, room in ((1.0, high[k]), (-1.0, -low[k])) if room > SIZES[0]]
+    value = c.value(max(seen, key=abs))
+    return Limit(float(value if c.inverse else abs(value - c.neutral)), c.parameter.unit)
 
 
 def _shape(problem: Problem, model: Model, parameters: Parameters, effect: str) -> Array:
@@ -76,10 +70,8 @@ def _shape(problem: Problem, model: Model, parameters: Parameters, effect: str) 
     return parameters.vector({**model.values, effect: values})
 
 
-def _smallest(
-    problem: Problem, parameters: Parameters, start: Array, k: int, side: float
-) -> tuple[float, Coordinate, float] | None:
-    """Return the smallest size on one side that would be named: in sizes worth a name, its coordinate, its value."""
+def _smallest(problem: Problem, parameters: Parameters, start: Array, k: int, side: float) -> float | None:
+    """Return the smallest value of a coordinate, on one side of neutral, that would be named."""
     coordinate, (low, high) = parameters.coordinates[k], parameters.bounds
     scale = 1.0 if not coordinate.inverse else high[k] / SIZES[-1]
     vectors = np.tile(start, (len(SIZES) + 1, 1))
@@ -94,8 +86,7 @@ def _smallest(
             problem, parameters, vectors[0], vectors[n + 1]
         ):
             z = side * scale * _between(shown, n) if n == enough[0] else vectors[n + 1, k]
-            z = float(np.clip(MARGIN * z, low[k], high[k]))
-            return abs(z), coordinate, coordinate.value(z)
+            return float(np.clip(MARGIN * z, low[k], high[k]))
     return None
 
 
