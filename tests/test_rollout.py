@@ -102,11 +102,39 @@ def test_same_seed_same_noise_other_seed_other():
     assert times[0] == times[1] != times[2]
 
 
-@pytest.mark.parametrize("effect", ["sensor_lag", "sensor_delay", "actuation_delay"])
-def test_late_sensors_and_motors_change_the_drive(effect):
-    label = {"sensor_lag": "time_constant_s"}.get(effect, "time_s")
-    late = World(EV3.with_effects({effect: {label: 0.03}}), PAPER)
-    assert simulate(late, LAPS.opcodes).time_s != simulate(WORLD, LAPS.opcodes).time_s
+def readings(robot):
+    """What the sensor reports every 2 ms while the robot turns over the line, shape (steps,)."""
+    stepped = SteppedRobot(World(robot, PAPER))
+    stepped.set_duty(-0.3, 0.3)
+    found = []
+    for _ in range(300):
+        found.append(stepped.reflection_pct)
+        stepped.advance(2)
+    return np.array(found)
+
+
+def test_a_late_sensor_reports_what_it_saw_before():
+    now, late = readings(EV3), readings(EV3.with_effects({"sensor_delay": {"time_s": 0.04}}))
+    assert np.ptp(now) > 90.0
+    assert np.array_equal(late[20:], now[:-20])
+
+
+def test_a_lagging_sensor_approaches_what_it_sees():
+    now, lags = readings(EV3), readings(EV3.with_effects({"sensor_lag": {"time_constant_s": 0.02}}))
+    level, keep = now[0], np.exp(-0.002 / 0.02)
+    for k, reading in enumerate(now):
+        level = keep * level + (1.0 - keep) * reading
+        assert lags[k] == pytest.approx(level, abs=1.01)  # both are whole percents
+    assert np.abs(lags - now).max() > 10.0
+
+
+def test_the_longest_delay_is_kept_at_the_smallest_step():
+    late = World(
+        EV3.with_effects({"actuation_delay": {"time_s": 0.25}}), PAPER, step_s=0.0001, time_limit_s=0.5
+    )
+    trace = simulate(late, opcodes("motor(60,60,1000)"), trace=True).trace
+    moved = trace["t_s"][trace["left_angle_rad"] > 0.0]
+    assert moved[0] == pytest.approx(0.26)
 
 
 def test_a_delay_of_whole_steps_shifts_the_motion_by_them():
@@ -138,6 +166,19 @@ def test_stepped_robot_drives_as_the_program_does():
     trace = simulate(WORLD, LAPS.opcodes, trace=True).trace
     n = round(100 * robot.time_s)
     assert robot.pose == pytest.approx((trace["x_m"][n], trace["y_m"][n], trace["heading_rad"][n]), abs=1e-12)
+
+
+def test_a_stepped_robots_motors_have_noise_as_a_programs_do():
+    noisy = World(EV3, PAPER, noise=Noise(motor_share=0.1))
+    trace = simulate(noisy, opcodes("motor(50,50,400)"), seed=3, trace=True).trace
+    robot, other = SteppedRobot(noisy, seed=3), SteppedRobot(noisy, seed=4)
+    for each in (robot, other):
+        each.set_duty(0.5, 0.5)
+        each.advance(400)
+    assert robot.pose == pytest.approx(
+        (trace["x_m"][40], trace["y_m"][40], trace["heading_rad"][40]), abs=1e-12
+    )
+    assert robot.pose != other.pose
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gecar.random_streams import normal
 from gecar.world.kernel.drive import hold_duties
 from gecar.world.kernel.interpreter import read_sensor
-from gecar.world.kernel.state import place
 from gecar.world.rollout import Driver, World
 
 
@@ -29,10 +29,14 @@ class SteppedRobot:
         self._setup.eyes["stream"] = seed
         self._step, self._due_ms = 0, 0.0
         self._duties = (0.0, 0.0)
-        place(self._setup.state[0], self._setup.physics[0], *self._setup.start)
+        hold_duties(0, 0, 0.0, 0.0, self._setup)  # puts the robot at START, and the sensors' memory with it
 
     def set_duty(self, left: float, right: float) -> None:
-        """Command duties [-1..1], held until the next command."""
+        """Command duties [-1..1], held until the next command; each has noise of its own, where the world has any."""
+        eyes = self._setup.eyes[0]
+        if eyes["motor_noise"] > 0.0:
+            left *= 1.0 + eyes["motor_noise"] * normal(eyes)
+            right *= 1.0 + eyes["motor_noise"] * normal(eyes)
         self._duties = (left, right)
 
     def advance(self, ms: float) -> None:
