@@ -5,7 +5,6 @@ import pytest
 from driving import NOMINAL, axle, hold, run, wild_duties
 from nominal_reference import nominal_run
 
-from gecar.world.effects import CATALOGUE
 from gecar.world.kernel.motor import bare_shaft, conduct
 from gecar.world.kernel.state import DERIVED, GRAVITY, derive
 
@@ -138,59 +137,6 @@ def test_nominal_robot_equals_a_model_without_effects_bit_for_bit(seed):
     assert np.array_equal(history["x"], x)
     assert np.array_equal(history["y"], y)
     assert np.array_equal(history["left_angle"], left)
-
-
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.id)
-def test_effect_at_its_neutral_size_vanishes_whatever_its_shape(effect):
-    rng = np.random.default_rng(7)
-    size, *shape = effect.parameters
-    if size.neutral is not None and effect.id not in MANY_SIZES:
-        values = {size.label: size.neutral}
-        values |= {p.label: float(rng.uniform(p.low, min(p.high, p.low + 10.0))) for p in shape}
-        duties = wild_duties(2)
-        changed = run(duties, NOMINAL.with_effects({effect.id: values}))
-        assert np.array_equal(changed, run(duties))
-
-
-# Effects whose parameters are each a size of their own; all of them must be neutral.
-MANY_SIZES = {"friction_asymmetry", "floor_tilt", "sensor_gain", "sensor_position", "line_shift"}
-
-
-@pytest.mark.parametrize(
-    ("effect", "values"),
-    [
-        ("backlash", {"angle_deg": 5.0}),
-        ("static_friction", {"extra_torque_nm": 0.01}),
-        ("dead_band", {"duty_pct": 8.0}),
-        ("command_slew", {"rate_pct_s": 200.0}),
-        ("battery_resistance", {"resistance_ohm": 1.0}),
-        ("battery_drain", {"rate_v_s": 0.05}),
-        ("torque_ripple", {"amplitude_nm": 0.01, "cycles_per_rev": 6.0}),
-        ("speed_limit", {"speed_rad_s": 8.0}),
-        ("caster_drag", {"coefficient": 0.4}),
-        ("rolling_resistance", {"coefficient": 0.03}),
-        ("slippery_patch", {"radius_m": 0.3, "coefficient": 0.05}),
-    ],
-)
-def test_effect_moves_the_robot(effect, values):
-    duties = wild_duties(2)
-    assert not np.array_equal(run(duties, NOMINAL.with_effects({effect: values}))["x"], run(duties)["x"])
-
-
-def test_backlash_lets_the_encoder_turn_before_the_robot_moves():
-    history = run(hold(0.3, 0.3, 1.0), NOMINAL.with_effects({"backlash": {"angle_deg": 6.0}}))
-    moving = np.argmax(history["vx"] > 1e-4)
-    assert math.degrees(history["left_angle"][moving]) == pytest.approx(3.0, abs=0.6)
-
-
-def test_speed_limit_holds_the_wheel_at_the_limit():
-    limited = NOMINAL.with_effects({"speed_limit": {"speed_rad_s": 8.0}})
-    assert run(hold(0.8, 0.8, 2.0), limited)["left_speed"][-1] == pytest.approx(8.0, rel=0.01)
-
-
-def test_slew_ramps_the_duty():
-    ramped = NOMINAL.with_effects({"command_slew": {"rate_pct_s": 100.0}})
-    assert run(hold(0.5, 0.5, 0.25), ramped)["left_duty"][-1] == pytest.approx(0.25)
 
 
 def test_regulated_motor_holds_ten_degrees_a_second_per_percent():

@@ -63,6 +63,22 @@ def test_a_late_command_moves_the_whole_run_later() -> None:
     np.testing.assert_allclose(late.left_angle_rad[10:], recording.left_angle_rad[:-10], atol=1e-9)
 
 
+def test_a_clock_that_runs_fast_stretches_the_log() -> None:
+    recording, skewed = driven(steps, waves), EV3.with_effects({"clock_skew": {"rate": 0.02}})
+    stretched = replace(recording, t_s=1.02 * recording.t_s)
+    again = replay(stretched, skewed, align=False)
+    np.testing.assert_allclose(again.x_m, recording.x_m, atol=1e-6)
+    np.testing.assert_allclose(again.left_angle_rad, recording.left_angle_rad, atol=1e-5)
+
+
+def test_late_camera_poses_are_of_earlier() -> None:
+    recording = driven(steps, waves)
+    late = EV3.with_effects({"pose_delay": {"time_s": 0.05}}).physics
+    poses = replayer_of(recording).play(late).poses
+    seen = np.column_stack([recording.x_m, recording.y_m, recording.heading_rad])
+    np.testing.assert_allclose(poses[5:], seen[:-5], atol=1e-9)
+
+
 def test_uneven_rows_see_the_same_motion() -> None:
     recording = driven(steps, waves)
     rows = np.sort(np.random.default_rng(1).choice(np.arange(1, 400), 150, replace=False))

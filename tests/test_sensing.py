@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from gecar.reality.replay.reflectance import readings_along
 from gecar.world.course.course import load_course
 from gecar.world.kernel.sensing import (
     RING,
@@ -14,6 +15,7 @@ from gecar.world.kernel.sensing import (
 )
 from gecar.world.kernel.state import STATE, place
 from gecar.world.robot import load_robot
+from gecar.world.rollout import World
 
 EV3, PAPER = load_robot("ev3"), load_course("paper")
 RASTER, PITCH = PAPER.raster(), PAPER.pitch_m
@@ -58,9 +60,74 @@ def test_both_ways_to_average_agree():
         assert seen(x, 0.6, heading) == pytest.approx(slow, abs=1.5)
 
 
-def test_shifted_line_is_seen_where_it_lies():
-    shifted = EV3.with_effects({"line_shift": {"dx_m": 0.01, "dy_m": 0.0}})
-    assert seen(0.0915, 0.6, robot=shifted) == pytest.approx(seen(0.0815, 0.6))
+def spot_seen(x, y, heading=0.0, robot=EV3):
+    """What `seen` gives, as fits see it: the spot averaged on the way."""
+    cos, sin = np.cos(heading), np.sin(heading)
+    return spot_reflection(RASTER, PITCH, x, y, cos, sin, 0.0, robot.physics[0])
+
+
+@pytest.mark.parametrize("look", [seen, spot_seen])
+@pytest.mark.parametrize(
+    "shift", [(0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.05), (0.01, -0.02, -0.03)]
+)
+def test_shifted_course_is_seen_where_it_lies(look, shift):
+    dx, dy, angle = shift
+    shifted = EV3.with_effects({"line_shift": {"dx_m": dx, "dy_m": dy, "angle_rad": angle}})
+    poses = [(0.0815, 0.6, 0.0), (0.083, 0.7, 0.2), (1.2, 0.08, 1.55)]
+    there = [
+        ((x + 1j * y) * np.exp(1j * angle) + complex(dx, dy), heading + angle) for x, y, heading in poses
+    ]
+    moved = [look(place.real, place.imag, heading, shifted) for place, heading in there]
+    assert moved == pytest.approx([look(*pose) for pose in poses], abs=1e-6)
+    unmoved = [look(place.real, place.imag, heading) for place, heading in there]
+    assert np.abs(np.subtract(moved, unmoved)).max() > 5.0
+
+
+@pytest.mark.parametrize("look", [seen, spot_seen])
+def test_a_sensor_mounted_elsewhere_sees_what_is_there(look):
+    moved = EV3.with_effects(
+        {"sensor_position": {"ahead_m": EV3.colour_sensor.ahead + 0.01, "left_m": -0.02}}
+    )
+    there = complex(0.0815, 0.6) + complex(0.01, -0.02) * np.exp(0.3j)
+    assert look(0.0815, 0.6, 0.3, moved) == pytest.approx(look(there.real, there.imag, 0.3), abs=1e-6)
+    assert look(0.0815, 0.6, 0.3, moved) != pytest.approx(look(0.0815, 0.6, 0.3), abs=1.0)
+
+
+@pytest.mark.parametrize("offset_mm", [-9.0, -5.0, 6.0, 9.0])
+def test_a_larger_spot_blurs_the_edge_in_drives_and_in_fits(offset_mm):
+    large = EV3.with_effects({"spot_size": {"diameter_m": 0.024}})
+    x = 0.1625 + offset_mm / 1000.0 - EV3.colour_sensor.ahead
+    expected = pytest.approx(100.0 * (1.0 - covered(offset_mm / 1000.0, 0.012)), abs=1.6)
+    state, floor = np.zeros(1, STATE), World(large, PAPER).floor
+    place(state[0], large.physics[0], x, 0.6, 0.0)
+    assert glance(floor.averaged, floor.pitch, state[0], 0.0, large.physics[0]) == expected
+    assert spot_seen(x, 0.6, 0.0, large) == expected
+
+
+def crossing(robot, seconds=0.6, dt=0.002):
+    """Predicted readings of a sensor that is carried over the line at 0.25 m/s, from white to black to white."""
+    t = np.arange(0.0, seconds, dt)
+    path = np.column_stack([0.02 + 0.25 * t, np.full_like(t, 0.6), np.zeros_like(t)])
+    readings = np.zeros_like(t)
+    readings_along(t, path, 0.0, 1e-3, RASTER, PITCH, robot.physics, np.zeros(3), readings)
+    return readings
+
+
+def test_a_late_sensor_is_predicted_to_report_what_it_saw_before():
+    now, late = crossing(EV3), crossing(EV3.with_effects({"sensor_delay": {"time_s": 0.04}}))
+    assert late[20:] == pytest.approx(now[:-20], abs=1e-6)
+
+
+def test_a_lagging_sensor_is_predicted_to_lose_its_time_constant_at_an_edge():
+    # the area between a step and a first-order lag's answer is the step times the time constant
+    now, lags = crossing(EV3), crossing(EV3.with_effects({"sensor_lag": {"time_constant_s": 0.01}}))
+    to_black = slice(0, int(np.argmin(now)) + 25)
+    assert (lags - now)[to_black].sum() * 0.002 == pytest.approx(100.0 * 0.01, rel=0.01)
+
+
+def test_gain_and_offset_are_predicted():
+    now, other = crossing(EV3), crossing(EV3.with_effects({"sensor_gain": {"gain": 0.5, "offset_pct": 10.0}}))
+    assert other == pytest.approx(0.5 * now + 10.0, abs=0.01)
 
 
 def test_report_is_a_whole_percent_within_bounds():
