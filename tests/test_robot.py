@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from gecar.errors import InputError
+from gecar.reality.fitting.parameters import free
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS
 from gecar.world.robot import load_robot, read_robot, write_robot
 
@@ -54,6 +55,26 @@ def test_bad_robot_file_is_refused_with_its_field(tmp_path, old, new, said):
 def test_unknown_effect_or_value_is_refused(effects, said):
     with pytest.raises(InputError, match=said):
         EV3.with_effects(effects)
+
+
+@pytest.mark.parametrize(
+    ("caster", "ahead"), [(-0.05, -0.06), (-0.05, -0.05), (-0.085, 0.01), (0.05, -0.01), (0.05, 0.06)]
+)
+def test_a_centre_of_mass_that_is_not_between_axle_and_caster_is_refused(tmp_path, caster, ahead):
+    shorter = EV3.model_copy(
+        update={"body": EV3.body.model_copy(update={"caster_ahead": caster, "com_ahead": 0.5 * caster})}
+    )
+    effect = {"com_offset": {"ahead_m": ahead}}
+    with pytest.raises(InputError, match=r"com_offset.ahead_m = .*, expected .* m"):
+        shorter.with_effects(effect)
+    write_robot(shorter.model_copy(update={"effects": effect}), tmp_path / "robot.toml")
+    with pytest.raises(InputError, match=r"com_offset.ahead_m = .*, expected .* m"):
+        read_robot(tmp_path / "robot.toml")
+    free_low, free_high = free(shorter, ["com_offset"]).bounds
+    standing = [
+        free(shorter, ["com_offset"]).coordinates[0].value(float(z)) for z in (free_low[0], free_high[0])
+    ]
+    assert all(0.0 <= place / caster < 1.0 for place in standing)
 
 
 def test_unknown_robot_is_refused():

@@ -113,7 +113,7 @@ class Robot(_Section):
     @model_validator(mode="after")
     def _known_effects(self) -> Robot:
         for effect_id, values in self.effects.items():
-            _check_effect(effect_id, values)
+            self._check_effect(effect_id, values)
         return self
 
     @property
@@ -154,6 +154,14 @@ class Robot(_Section):
             return parameter.neutral
         return self._own_constants()[parameter.field] / parameter.si
 
+    def bounds(self, parameter: Parameter) -> tuple[float, float]:
+        """Return the lowest and highest value a parameter can have in this robot, in the parameter's unit."""
+        if parameter.field == "com_ahead":  # between the axle and the caster, or the robot falls over
+            short_of_caster = self.body.caster_ahead - math.copysign(0.001, self.body.caster_ahead)
+            return min(round(short_of_caster, 6), 0.0), max(round(short_of_caster, 6), 0.0)
+        # Bounds on torques are an EV3's; a larger drive has larger ones.
+        return parameter.low, math.inf if parameter.unit.startswith("N m") else parameter.high
+
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Robot:
         """Return this robot with effects added or replaced.
 
@@ -164,26 +172,24 @@ class Robot(_Section):
         """
         for effect_id, values in effects.items():
             try:
-                _check_effect(effect_id, values)
+                self._check_effect(effect_id, values)
             except ValueError as error:
                 raise InputError(f"effect {effect_id}: {error}") from None
         return self.model_copy(update={"effects": {**self.effects, **effects}})
 
-
-def _check_effect(effect_id: str, values: Mapping[str, float]) -> None:
-    if effect_id not in BY_ID:
-        raise ValueError(f"found effect '{effect_id}', expected one of the catalogue: {', '.join(BY_ID)}")
-    labels = {p.label: p for p in BY_ID[effect_id].parameters}
-    for label, value in values.items():
-        if label not in labels:
-            raise ValueError(f"found '{label}' in effect {effect_id}, expected one of {', '.join(labels)}")
-        p = labels[label]
-        # Bounds on torques are an EV3's; a larger drive has larger ones.
-        high = math.inf if p.unit.startswith("N m") else p.high
-        if math.isnan(value) or not p.low <= value <= high:
-            raise ValueError(
-                f"found {effect_id}.{label} = {value:g}, expected {p.low:g} to {high:g} {p.unit}"
-            )
+    def _check_effect(self, effect_id: str, values: Mapping[str, float]) -> None:
+        if effect_id not in BY_ID:
+            raise ValueError(f"found effect '{effect_id}', expected one of the catalogue: {', '.join(BY_ID)}")
+        labels = {p.label: p for p in BY_ID[effect_id].parameters}
+        for label, value in values.items():
+            if label not in labels:
+                raise ValueError(
+                    f"found '{label}' in effect {effect_id}, expected one of {', '.join(labels)}"
+                )
+            low, high = self.bounds(labels[label])
+            if math.isnan(value) or not low <= value <= high:
+                wanted = f"{low:g} to {high:g} {labels[label].unit}"
+                raise ValueError(f"found {effect_id}.{label} = {value:g}, expected {wanted}")
 
 
 def robot_from(table: Mapping[str, Any], where: str | Path) -> Robot:

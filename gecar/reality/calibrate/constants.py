@@ -137,8 +137,14 @@ class FreeConstants:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest vectors."""
-        low, high = (np.array([getattr(c, end) for c in self.constants]) for end in ("low", "high"))
+        low, high = np.array([self._ends(c) for c in self.constants], float).reshape(-1, 2).T
         return (low - self.standing) / self.steps, (high - self.standing) / self.steps
+
+    def _ends(self, constant: Constant) -> tuple[float, float]:
+        """Return the lowest and highest value of a constant; the centre of mass stays between axle and caster."""
+        if constant.kernel == "com_ahead":
+            return self.robot.bounds(BY_ID["com_offset"].parameters[0])
+        return constant.low, constant.high
 
     def values(self, z: Array) -> Array:
         """Return the constants at a vector, shape (k,)."""

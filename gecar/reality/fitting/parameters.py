@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -151,11 +151,19 @@ def free(robot: Robot, effect_ids: Sequence[str]) -> Parameters:
     return Parameters(
         robot,
         tuple(
-            Coordinate(BY_ID[i], p, _known_value(robot, BY_ID[i], p), torque_scale(robot, p.unit))
+            Coordinate(
+                BY_ID[i], _bounded(robot, p), _known_value(robot, BY_ID[i], p), torque_scale(robot, p.unit)
+            )
             for i in effect_ids
             for p in BY_ID[i].parameters
         ),
     )
+
+
+def _bounded(robot: Robot, parameter: Parameter) -> Parameter:
+    """Return a parameter with the bounds this robot's body sets."""
+    low, high = robot.bounds(parameter)
+    return parameter if math.isinf(high) else replace(parameter, low=low, high=high)
 
 
 def torque_scale(robot: Robot, unit: str = "N m") -> float:
