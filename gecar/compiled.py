@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -40,10 +41,21 @@ def _kernel_hash(package: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def _user_cache() -> Path:
+    """Return the user's cache folder; for a user without a home, as in bare containers, one nobody else can write."""
+    if os.environ.get("XDG_CACHE_HOME"):
+        return Path(os.environ["XDG_CACHE_HOME"])
+    try:
+        return Path.home() / ".cache"
+    except RuntimeError:
+        own = Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"
+    own.mkdir(mode=0o700, exist_ok=True)
+    return own if own.stat().st_uid == os.getuid() else Path(tempfile.mkdtemp())
+
+
 def _cache_folder() -> Path:
     """Return this version's cache folder, under ``GECAR_CACHE_DIR`` or the user's cache folder."""
-    home = os.environ.get("GECAR_CACHE_DIR")
-    root = Path(home) if home else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gecar"
+    root = Path(os.environ.get("GECAR_CACHE_DIR") or _user_cache() / "gecar")
     folder = root / f"kernels-{_kernel_hash(Path(__file__).parent)}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,46 @@
+"""Where compiled code is kept: a folder of its own for every state of the sources, with a home or without."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from gecar import compiled
+
+PACKAGE = Path(compiled.__file__).parent
+
+
+@pytest.mark.parametrize(
+    "changed", ["world/kernel/motor.py", "world/effects.py", "language/opcodes.py", "random_streams.py"]
+)
+def test_a_change_in_any_room_that_compiles_gives_another_cache(tmp_path: Path, changed: str) -> None:
+    copy = shutil.copytree(PACKAGE, tmp_path / "gecar", ignore=shutil.ignore_patterns("__pycache__"))
+    before = compiled._kernel_hash(copy)
+    with (copy / changed).open("a") as stream:
+        stream.write("\nCHANGED = 1\n")
+    assert compiled._kernel_hash(copy) != before
+
+
+def test_the_cache_lies_where_the_user_wants_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GECAR_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert compiled._cache_folder().parent == tmp_path / "xdg" / "gecar"
+    monkeypatch.setenv("GECAR_CACHE_DIR", str(tmp_path / "own"))
+    assert compiled._cache_folder().parent == tmp_path / "own"
+
+
+def test_a_user_without_a_home_gets_a_private_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("GECAR_CACHE_DIR", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = compiled._cache_folder()
+    assert folder.is_dir()
+    assert folder.is_relative_to(tmp_path)
+    assert folder.parents[1].stat().st_mode & 0o077 == 0
