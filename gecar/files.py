@@ -1,10 +1,13 @@
-"""Writing files whole or not at all, and reading TOML with errors that name the place."""
+"""Files written whole or not at all, JSON text, and TOML read with errors that name the place."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import tempfile
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +52,30 @@ def write_whole(path: Path, content: str | bytes, durable: bool = True) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def json_ready(value: Any) -> Any:
+    """Return a value as JSON knows it: NumPy's numbers and arrays as Python's, nan and inf as null, others as text."""
+    if isinstance(value, Mapping):
+        return {str(key): json_ready(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_ready(each) for each in value]
+    if hasattr(value, "tolist"):
+        return json_ready(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
+def json_text(table: Mapping[str, Any]) -> str:
+    """Write a table as JSON, by `json_ready`, indented."""
+    return json.dumps(json_ready(table), indent=2, allow_nan=False) + "\n"
+
+
+def json_lines(table: Mapping[str, Any]) -> str:
+    """Write a table as JSON, by `json_ready`, a line a field: for tables with long lists."""
+    fields = (f"  {json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in json_ready(table).items())
+    return "{\n" + ",\n".join(fields) + "\n}\n"
 
 
 def is_file(path: Path) -> bool:

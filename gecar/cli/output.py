@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+
+from gecar.files import json_text
 
 JsonOption = Annotated[
     bool,
@@ -42,17 +42,4 @@ class Output:
     def print_json(self, table: Mapping[str, Any]) -> None:
         """Print a command's JSON object, if that is what is wanted."""
         if self.as_json:
-            sys.stdout.write(json.dumps(plain(table), indent=2, allow_nan=False) + "\n")
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON knows it: numbers that are none become null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(each) for each in value]
-    if hasattr(value, "tolist"):  # NumPy's numbers and arrays
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, bool | int | float | str | None) else str(value)
+            sys.stdout.write(json_text(table))

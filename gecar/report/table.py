@@ -138,8 +138,8 @@ def as_table(
             {
                 study.rows.name: cell.row,
                 study.columns.name: cell.column,
-                **{name: _number(value) for name, value in cell.figures().items()},
-                **({"paper_s": _number(of_paper(cell, paper))} if paper else {}),
+                **cell.figures(),
+                **({"paper_s": of_paper(cell, paper)} if paper else {}),
             }
             for cell in cells
         ],
@@ -220,10 +220,6 @@ def piped(lines: Sequence[Sequence[str]]) -> str:
     head, *rest = (f"| {' | '.join(line)} |" for line in lines)
     rule = "|" + "|".join(["---"] * len(lines[0])) + "|"
     return "\n".join([head, rule, *rest])
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else value
 
 
 def _csv(value: Any) -> Any:

@@ -20,7 +20,7 @@ from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.history import Generation
 from gecar.evolution.scores import UNSOLVED
 from gecar.evolution.state import State
-from gecar.files import read_text, write_whole
+from gecar.files import json_lines, read_text, write_whole
 from gecar.language.program import Program
 from gecar.results.checkpoint import pack, unpack
 
@@ -141,10 +141,7 @@ class RunFolder:
             Fields that are known outside the evolution.
         """
         result = {**outcome_of(evolution), **more}
-        lines = [
-            f"  {json.dumps(name)}: {json.dumps(value, allow_nan=False)}" for name, value in result.items()
-        ]
-        self.write("result.json", "{\n" + ",\n".join(lines) + "\n}\n")
+        self.write("result.json", json_lines(result))
         return result
 
 

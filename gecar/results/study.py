@@ -7,7 +7,6 @@ however suddenly, loses the runs under way and no other, and a grid that grows t
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gecar.errors import InputError, expected
-from gecar.files import read_text, write_whole
+from gecar.files import json_lines, json_text, read_text, write_whole
 from gecar.language.grammar import load_grammar
 from gecar.results.config import NOT_PART_OF_THE_RESULT, Config, configure, identify, merged
 from gecar.results.provenance import fingerprints, versions
@@ -149,7 +148,7 @@ class Study:
             "changes": self.changes,
             "provenance": versions(),
         }
-        return json.dumps(table, indent=2) + "\n"
+        return json_text(table)
 
 
 def read_study(folder: Path) -> Study:
@@ -211,9 +210,8 @@ class StudyFolder:
             If it can not be written.
         """
         place = self.runs / run.file
-        lines = [f"  {json.dumps(name)}: {json.dumps(_plain(value))}" for name, value in record.items()]
         try:
-            write_whole(place, "{\n" + ",\n".join(lines) + "\n}\n")
+            write_whole(place, json_lines(record))
         except OSError as error:
             raise expected(
                 place, error.strerror or "an error", "to write it; runs before it are kept"
@@ -263,15 +261,6 @@ def _read_json(path: Path, what: str) -> dict[str, Any]:
     if not isinstance(table, dict):
         raise expected(path, "no JSON object", what)
     return table
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON knows it; nan becomes null."""
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _slug(value: Any) -> str:

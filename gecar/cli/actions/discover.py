@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -14,9 +13,9 @@ from typing import Any, NamedTuple
 
 import typer
 
-from gecar.cli.output import Output, plain
+from gecar.cli.output import Output
 from gecar.errors import InputError
-from gecar.files import write_whole
+from gecar.files import json_ready, json_text, write_whole
 from gecar.language.program import Program
 from gecar.parallel.run_parallel import Workplace, perform_each
 from gecar.reality.discovery import discover
@@ -77,8 +76,8 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
         material=task.material, program=task.program,
     )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
-    table = plain(verdict.as_json())
-    write_whole(out / "verdict.json", json.dumps(table, indent=1, allow_nan=False) + "\n")
+    table = json_ready(verdict.as_json())
+    write_whole(out / "verdict.json", json_text(table))
     write_robot(verdict.robot, out / "robot.toml")
     if task.pictures:
         tell("pictures")

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from gecar.cli.options import settings
-from gecar.cli.output import Output, plain
+from gecar.cli.output import Output
 from gecar.compiled import is_cold, mark_warm
 from gecar.errors import expected
-from gecar.files import write_whole
+from gecar.files import json_text, write_whole
 from gecar.parallel.executors import check_workers, usable_cores
 from gecar.parallel.run_parallel import Workplace
 from gecar.plots.runs.study_table import convergences, heat_map
@@ -160,7 +160,7 @@ def _tell(
     write_whole(folder.path / "table.md", markdown(wanted, cells, paper, about))
     write_whole(folder.path / "table.csv", csv_text(wanted, cells, paper))
     write_whole(folder.path / "runs.csv", runs_csv(wanted, cells))
-    write_whole(folder.path / "table.json", _json(answer))
+    write_whole(folder.path / "table.json", json_text(answer))
     drawn = draw(wanted, cells, paper, about, folder.path) if pictures else []
     warning = other_versions(records)
     if warning:
@@ -205,12 +205,6 @@ def _about(wanted: Study, run: Planned, cells: Sequence[Cell]) -> str:
     runs = sorted({len(cell.records) for cell in cells})
     parts.append(f"{runs[0]} seeds a cell" if len(runs) == 1 else f"{runs[0]} to {runs[-1]} seeds a cell")
     return " · ".join(parts)
-
-
-def _json(answer: dict[str, Any]) -> str:
-    import json
-
-    return json.dumps(plain(answer), indent=2, allow_nan=False) + "\n"
 
 
 class _Watch:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gecar.cli.output import JsonOption, Output, plain
+from gecar.cli.output import JsonOption, Output
 
 
 def calibrate(
@@ -42,9 +42,7 @@ def calibrate(
       gecar calibrate recordings/bench --holdout step_040,step_080 --json
       gecar evolve --robot calibrated/robot.toml
     """
-    import json
-
-    from gecar.files import write_whole
+    from gecar.files import json_text, write_whole
     from gecar.reality.calibrate.calibration import calibrate as calibrate_case
     from gecar.reality.recordings.recording import read_case
     from gecar.report.calibration import calibration_lines, calibration_table
@@ -61,7 +59,7 @@ def calibrate(
     out.mkdir(parents=True, exist_ok=True)
     table = calibration_table(result)
     written = {"robot": str(out / "robot.toml"), "table": str(out / "calibration.json")}
-    write_whole(out / "calibration.json", json.dumps(plain(table), indent=1, allow_nan=False) + "\n")
+    write_whole(out / "calibration.json", json_text(table))
     write_robot(result.robot, out / "robot.toml")
     if picture:
         from gecar.plots.reality.calibration import calibration_figure

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gecar.cli.options import CourseOption, RobotOption
-from gecar.cli.output import JsonOption, Output, plain
+from gecar.cli.output import JsonOption, Output
 from gecar.errors import expected
 
 if TYPE_CHECKING:
@@ -115,14 +115,15 @@ def _program(place: Path | None, trials: list[Recording]) -> Program | None:
 
 def _write(found: Gap, out: Path, picture: bool) -> dict[str, str]:
     """Write the tables and the picture; return where."""
-    import json
-
-    from gecar.files import write_whole
+    from gecar.files import json_text, write_whole
     from gecar.report.gap import gap_csv, gap_markdown, gap_table
 
     out.mkdir(parents=True, exist_ok=True)
-    table = json.dumps(plain(gap_table(found)), indent=1, allow_nan=False) + "\n"
-    for ending, text in (("md", gap_markdown(found)), ("csv", gap_csv(found)), ("json", table)):
+    for ending, text in (
+        ("md", gap_markdown(found)),
+        ("csv", gap_csv(found)),
+        ("json", json_text(gap_table(found))),
+    ):
         write_whole(out / f"compare.{ending}", text)
     written = {kind: str(out / f"compare.{kind}") for kind in ("md", "csv", "json")}
     if picture:
