@@ -18,8 +18,10 @@ def edited(tmp_path, old, new):
     return path
 
 
-def test_robot_file_is_read_back_equal(tmp_path):
+@pytest.mark.parametrize("name", ["ev3", 'two\n"lines"', "a bell \x07, a delete \x7f, a \\"])
+def test_robot_file_is_read_back_equal(tmp_path, name):
     robot = EV3.with_effects({"backlash": {"angle_deg": 5.6}, "floor_tilt": {"x_rad": 0.01}})
+    robot = robot.model_copy(update={"name": name})
     write_robot(robot, tmp_path / "robot.toml")
     assert read_robot(tmp_path / "robot.toml") == robot
 

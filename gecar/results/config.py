@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gecar.errors import expected, first_fault
@@ -128,12 +129,7 @@ def identify(config: Config, fingerprints: Mapping[str, str]) -> str:
 
 def as_toml(config: Config, tables: Mapping[str, Mapping[str, Any]]) -> str:
     """Write a configuration, and tables about the run after it, as TOML."""
-    fields = config.model_dump()
-    tables = {"search": fields.pop("search"), **tables}
-    blocks = ["\n".join(f"{name} = {_toml(value)}" for name, value in fields.items())]
-    for name, table in tables.items():
-        blocks.append("\n".join([f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]))
-    return "\n\n".join(blocks) + "\n"
+    return tomli_w.dumps({**config.model_dump(), **tables})
 
 
 def difference(ours: Config, theirs: Config) -> tuple[str, Any, Any] | None:
@@ -155,11 +151,3 @@ def _place(name: str) -> str:
     """Make a file's name hold wherever it is read again; other names stay."""
     path = Path(name)
     return str(path.resolve()) if is_file(path) else name
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)

@@ -8,7 +8,6 @@ GOAL, and a share of drives that arrive (of searches the median) may move by `SH
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from gecar.errors import expected
 from gecar.files import read_toml, write_whole
@@ -192,11 +192,10 @@ def write_table(path: Path, table: FitnessTable) -> None:
     InputError
         If it can not be written.
     """
-    blocks = [_HEAD, _block("[versions]", table.versions)]
-    blocks += [_block("[[drive]]", row) for row in table.drives]
-    blocks += [_block("[[search]]", row) for row in table.searches]
+    rows = {"versions": table.versions, "drive": table.drives, "search": table.searches}
+    text = tomli_w.dumps({name: found for name, found in rows.items() if found})
     try:
-        write_whole(path, "\n\n".join(blocks) + "\n")
+        write_whole(path, f"{_HEAD}\n\n{text}")
     except OSError as error:
         raise expected(path, error.strerror or "an error", "to write it") from None
 
@@ -265,13 +264,3 @@ def _typical(value: Any) -> float | None:
     if isinstance(value, list) and value:
         return float(quantile(value, 0.5))
     return float(value) if isinstance(value, int | float) else None
-
-
-def _block(head: str, table: Mapping[str, Any]) -> str:
-    return "\n".join([head, *(f"{name} = {_toml(value)}" for name, value in table.items())])
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{name} = {_toml(each)}" for name, each in value.items()) + " }"
-    return json.dumps(value, ensure_ascii=False)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from gecar.errors import InputError, expected, first_fault
@@ -253,15 +254,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that `read_robot` reads back to an equal robot."""
-    lines = [f"name = {_toml(robot.name)}"]
-    sections = robot.model_dump(exclude={"name", "effects"})
-    sections |= {f"effects.{effect_id}": dict(values) for effect_id, values in robot.effects.items()}
-    for section, fields in sections.items():
-        lines += ["", f"[{section}]", *(f"{field} = {_toml(value)}" for field, value in fields.items())]
-    write_whole(path, "\n".join(lines) + "\n")
-
-
-def _toml(value: float | str) -> str:
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    return repr(float(value))
+    table = robot.model_dump()
+    if not table["effects"]:
+        del table["effects"]
+    write_whole(path, tomli_w.dumps(table))

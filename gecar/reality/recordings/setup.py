@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import tomli_w
 
 from gecar.errors import InputError, expected
 from gecar.files import is_file, read_text, read_toml
@@ -88,28 +89,16 @@ def read_setup(path: Path, factors: Mapping[str, tuple[str, float]]) -> Setup:
 
 def setup_toml(setup: Setup, folder: Path, factors: Mapping[str, tuple[str, float]]) -> str:
     """Return the TOML text of a setup, for a file in a folder: paths become relative to it."""
-    lines = [f"{key} = {_quoted(_relative(value, folder))}" for key, value in _named(setup) if value]
-    lines += [f"rig = {_quoted(setup.rig)}"]
-    if setup.duty_cap is not None:
-        lines.append(f"duty_cap = {setup.duty_cap!r}")
-    lines += [f"{key} = {_quoted(value)}" for key, value in _texts(setup) if value]
-    if setup.noise:
-        lines += ["", "[noise]"]
-        lines += [f"{c} = {setup.noise[f] / by:.9g}" for c, (f, by) in factors.items() if f in setup.noise]
-    return "\n".join(lines) + "\n"
-
-
-def _named(setup: Setup) -> tuple[tuple[str, str], ...]:
-    return ("robot", setup.robot), ("course", setup.course)
-
-
-def _texts(setup: Setup) -> tuple[tuple[str, str | None], ...]:
-    return ("program", setup.program), ("notes", setup.notes)
-
-
-def _quoted(text: str) -> str:
-    # A JSON string is a TOML basic string, but for this one character.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    table = {
+        "robot": _relative(setup.robot, folder),
+        "course": _relative(setup.course, folder),
+        "rig": setup.rig,
+        "duty_cap": setup.duty_cap,
+        "program": setup.program,
+        "notes": setup.notes,
+        "noise": {c: setup.noise[f] / by for c, (f, by) in factors.items() if f in setup.noise},
+    }
+    return tomli_w.dumps({key: value for key, value in table.items() if value not in (None, "", {})})
 
 
 def _relative(name: str, folder: Path) -> str:
