@@ -251,6 +251,20 @@ def test_turning_loads_the_outer_wheel():
     assert moment > 0.01
 
 
+def test_a_wider_track_shifts_less_load_to_the_outer_wheel():
+    wide = with_effect("load_transfer", with_effect("track_width", scale=1.4), height_m=0.1)
+    history = run(hold(0.3, 0.6, 3.0), wide)
+    last, aside = history[-1], history["left_side"][-2] + history["right_side"][-2]
+    shifted = NOMINAL.tyre.friction * aside * 0.1 / (1.4 * BODY.track_width)
+    assert last["right_circle"] - last["left_circle"] == pytest.approx(2.0 * shifted, rel=1e-6)
+
+
+def test_a_spin_turns_about_the_axle_wherever_the_centre_of_mass_is():
+    robot = with_effect("com_offset", ahead_m=-0.06)
+    path = axle(run(hold(-0.15, 0.15, 3.0), robot), robot)
+    assert np.abs(path).max() < 2e-3
+
+
 def test_a_centre_of_mass_near_the_caster_takes_load_off_the_wheels():
     robot = with_effect("tyre_friction", with_effect("com_offset", ahead_m=-0.06), coefficient=0.1)
     assert np.diff(spinning_up(robot))[50:] == pytest.approx(pull(0.1, ahead=-0.06) * DT, rel=1e-6)

@@ -2,7 +2,10 @@ import math
 
 import numpy as np
 import pytest
+from acting import strong
+from driving import run, wild_duties
 
+from gecar.world.effects import CATALOGUE
 from gecar.world.kernel.motor import bench_step
 from gecar.world.kernel.state import DERIVED, REGULATOR_RATE, STATE, derive, place
 from gecar.world.motor_bench import altered, settled_speeds
@@ -28,6 +31,25 @@ def test_told_a_speed_it_turns_ten_degrees_a_second_for_each_percent_up_to_the_l
     assert np.allclose(
         settled_speeds(altered(EV3, "speed"), (10, 55, 80, 100)), [100, 550, 800, 800], atol=0.5
     )
+
+
+MOTOR_EFFECTS = [effect for effect in CATALOGUE if effect.channels == ("motor",)]
+
+
+@pytest.mark.parametrize("mode", ["duty", "speed"])
+@pytest.mark.parametrize("effect", MOTOR_EFFECTS, ids=lambda effect: effect.id)
+def test_motors_on_a_bench_obey_the_laws_of_motors_that_turn_freely_on_ice(effect, mode):
+    ice = altered(EV3, mode).model_copy(update={"tyre": EV3.tyre.model_copy(update={"friction": 0.0})})
+    robot, duties = ice.with_effects({effect.id: strong(effect)}), wild_duties(5, 1.0)
+    (p,), (c,), (s,) = robot.physics, np.zeros(1, DERIVED), np.zeros(1, STATE)
+    derive(p, 0.002, c)
+    place(s, p, 0.0, 0.0, 0.0)
+    angles = np.empty((len(duties), 2))
+    for k, (left, right) in enumerate(duties):
+        bench_step(s, left, right, p, c)
+        angles[k] = s["left_angle"], s["right_angle"]
+    history = run(duties, robot)
+    assert np.column_stack([history["left_angle"], history["right_angle"]]) == pytest.approx(angles, abs=1e-9)
 
 
 def regulated_speeds(inertia_scale, step_s, command=0.5, seconds=1.5):

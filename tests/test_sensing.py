@@ -88,9 +88,12 @@ def test_a_sensor_mounted_elsewhere_sees_what_is_there(look):
     moved = EV3.with_effects(
         {"sensor_position": {"ahead_m": EV3.colour_sensor.ahead + 0.01, "left_m": -0.02}}
     )
-    there = complex(0.0815, 0.6) + complex(0.01, -0.02) * np.exp(0.3j)
-    assert look(0.0815, 0.6, 0.3, moved) == pytest.approx(look(there.real, there.imag, 0.3), abs=1e-6)
-    assert look(0.0815, 0.6, 0.3, moved) != pytest.approx(look(0.0815, 0.6, 0.3), abs=1.0)
+    at, heading = 0.13, 1.3  # nearly along the line, so that both shifts count
+    there = complex(at, 0.6) + complex(0.01, -0.02) * np.exp(1j * heading)
+    assert look(at, 0.6, heading, moved) == pytest.approx(look(there.real, there.imag, heading), abs=1e-6)
+    ahead_only = complex(at, 0.6) + 0.01 * np.exp(1j * heading)
+    for other in (complex(at, 0.6), ahead_only):
+        assert abs(look(at, 0.6, heading, moved) - look(other.real, other.imag, heading)) > 5.0
 
 
 @pytest.mark.parametrize("offset_mm", [-9.0, -5.0, 6.0, 9.0])
