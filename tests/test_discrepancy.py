@@ -96,6 +96,17 @@ def test_sizes_are_millimetres_and_degrees_that_anybody_can_check() -> None:
     assert 3.0 < sizes.left(narrow).deg_1m <= 1.1 * apart.deg_1m
 
 
+def test_recordings_without_poses_say_nothing_of_a_place() -> None:
+    runs = [recorded(EV3, seed) for seed in range(3)]
+    unseen = np.full(len(runs[0].t_s), np.nan)
+    blind = [replace(recorded(EV3, k), x_m=unseen, y_m=unseen, heading_rad=unseen) for k in (8, 9)]
+    wide = EV3.with_effects({"track_width": {"scale": 1.05}}).physics
+    there, nowhere = (1.0, 0.5), (9.0, 9.0)
+    assert sizes_of(runs).left_about(wide, there).deg_1m > 1.0
+    assert sizes_of(runs + blind).left_about(wide, there).deg_1m > 1.0
+    assert sizes_of(runs + blind).left_about(wide, nowhere) == Size()
+
+
 def test_what_is_material_is_so_by_any_of_its_units() -> None:
     line = Material(5.0)
     assert line.times(Size(mm_1m=5.0)) == pytest.approx(1.0)

@@ -21,7 +21,6 @@ from gecar.reality.residuals.of_recording import RecordingResiduals
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
 Rows = npt.NDArray[np.intp]
-Mask = npt.NDArray[np.bool_]
 
 PLACE = [X, Y, HEADING]
 METRE = 1.0
@@ -77,10 +76,12 @@ class Sizes:
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
 
-        What only one of several recordings shows there is that recording's, not the spot's.
+        What only one of several recordings shows there is that recording's, not the spot's. A recording without poses
+        says nothing of a place.
         """
-        passing = [size for run in self.runs if (size := _left(run, physics, spot)) != Size()]
-        return Size() if len(passing) < min(2, len(self.runs)) else combined(passing, statistics.median_low)
+        seen = [run for run in self.runs if run.replayer.has_poses]
+        passing = [size for run in seen if (size := _left_about(run, physics, spot)) is not None]
+        return Size() if len(passing) < min(2, len(seen)) else combined(passing, statistics.median_low)
 
 
 def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
@@ -91,18 +92,13 @@ def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
     return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
 
 
-def _left(run: RecordingResiduals, physics: Physics, spot: tuple[float, float] | None = None) -> Size:
+def _left(run: RecordingResiduals, physics: Physics) -> Size:
     out, track = Size(), float(physics["track_width"][0])
     rows = _replayed(run, physics)
     path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
     if run.replayer.has_poses:
-        place, _, heading = run.noise.path_sd / PATH_CAUTION
-        noise = _Noise(float(place), float(heading))
         seen = measured_path(run.replayer, physics)
-        if spot is not None:
-            near = np.hypot(seen[:, 0] - spot[0], seen[:, 1] - spot[1]) < SPOT_M
-            return _parting(path, seen, wheels, track, noise, near)
-        out = out.or_more(_parting(path, seen, wheels, track, noise))
+        out = out.or_more(_parting(path, seen, wheels, track, _path_noise(run)))
     measured = ~np.isnan(run.replayer.measured[:, :2]).all(axis=0)
     if run.recording.setup.rig == "bench":
         for side in np.flatnonzero(measured):
@@ -112,6 +108,24 @@ def _left(run: RecordingResiduals, physics: Physics, spot: tuple[float, float] |
         counted = _reckoned(run, physics, run.replayer.measured)
         out = out.or_more(_parting(wheels, counted, wheels, track, QUIET))
     return out
+
+
+def _left_about(run: RecordingResiduals, physics: Physics, spot: tuple[float, float]) -> Size | None:
+    """Return how far a robot parts from the poses seen, over windows of a metre that pass a spot; None: none does."""
+    rows = _replayed(run, physics)
+    seen, wheels = measured_path(run.replayer, physics), _reckoned(run, physics, rows)
+    near = np.hypot(seen[:, 0] - spot[0], seen[:, 1] - spot[1]) < SPOT_M
+    passed = np.r_[0, np.cumsum(near)]
+    first, last = _windows(wheels, float(physics["track_width"][0]))
+    inside = passed[last] > passed[first]
+    if not inside.any():
+        return None
+    return Size(*_beyond(rows[:, PLACE], seen, first[inside], last[inside], _path_noise(run)))
+
+
+def _path_noise(run: RecordingResiduals) -> _Noise:
+    place, _, heading = run.noise.path_sd / PATH_CAUTION
+    return _Noise(float(place), float(heading))
 
 
 def _reading_apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
@@ -149,22 +163,20 @@ def _rolled(run: RecordingResiduals, physics: Physics, angle: Array) -> Array:
     return np.column_stack([way, np.zeros((len(way), 2))])
 
 
-def _parting(
-    one: Array, other: Array, wheels: Array, track_m: float, noise: _Noise, near: Mask | None = None
-) -> Size:
-    """Return how far two paths part, over windows of a metre and as a whole; or over windows with certain rows."""
+def _windows(wheels: Array, track_m: float) -> tuple[Rows, Rows]:
+    """Return the first and last rows of windows of a metre, of wheels that roll or turn on the spot."""
     moved = np.r_[0.0, np.cumsum(np.hypot(*np.diff(wheels[:, :2], axis=0).T))]
     turned = np.r_[0.0, np.cumsum(np.abs(np.diff(wheels[:, 2])))] * 0.5 * track_m
     way = np.maximum(moved, turned)
     begins = np.arange(0.0, max(way[-1] - METRE, 0.0) + 1e-9, APART_M)
-    first = np.searchsorted(way, begins)
-    last = np.minimum(np.searchsorted(way, begins + METRE), len(way) - 1)
-    if near is not None:
-        passed = np.r_[0, np.cumsum(near)]
-        inside = passed[last] > passed[first]
-        return Size(*_beyond(one, other, first[inside], last[inside], noise)) if inside.any() else Size()
-    mm_1m, deg_1m = _beyond(one, other, first, last, noise)
-    mm_drive, deg_drive = _beyond(one, other, np.array([0]), np.array([len(way) - 1]), noise)
+    return np.searchsorted(way, begins), np.minimum(np.searchsorted(way, begins + METRE), len(way) - 1)
+
+
+def _parting(one: Array, other: Array, wheels: Array, track_m: float, noise: _Noise) -> Size:
+    """Return how far two paths part, over windows of a metre and as a whole."""
+    whole = np.array([0]), np.array([len(wheels) - 1])
+    mm_1m, deg_1m = _beyond(one, other, *_windows(wheels, track_m), noise)
+    mm_drive, deg_drive = _beyond(one, other, *whole, noise)
     return Size(mm_1m, deg_1m, mm_drive, deg_drive)
 
 
