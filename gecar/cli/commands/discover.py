@@ -10,6 +10,7 @@ import typer
 
 from gecar.cli.output import JsonOption, Output
 from gecar.errors import expected
+from gecar.reality.materiality import DEFAULT, Material
 
 
 def discover(
@@ -55,7 +56,7 @@ def discover(
         float,
         typer.Option("--material", metavar="MM",
                      help="From how many millimetres over a metre on something matters (and degrees: a fifth of it)."),
-    ] = 5.0,
+    ] = DEFAULT.mm,
     program: Annotated[
         Path | None,
         typer.Option("--program", metavar="FILE", show_default=False,
@@ -78,7 +79,6 @@ def discover(
     from gecar.cli.inputs import find_program
     from gecar.language.program import read_program
     from gecar.parallel.executors import usable_cores
-    from gecar.reality.materiality import Material
     from gecar.reality.recordings.recording import read_case
     from gecar.world.robot import load_robot
 
