@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from command import start
 
-from gecar import reality
+from gecar import notebook
 from gecar.errors import InputError
 from gecar.plots.reality.verdict import verdict_figures
 from gecar.plots.style import picture
@@ -296,18 +296,13 @@ def test_a_real_motor_is_predicted_within_a_hundredth() -> None:
     assert angle.after < 0.009
 
 
-def test_a_verdict_prints_and_plots_itself() -> None:
+def test_a_notebook_shows_a_verdict_in_words_tables_and_pictures() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
-    assert "commands act late" in str(verdict)
-    assert "<img alt='The gap on recordings set aside'" in verdict._repr_html_()
-    assert verdict.plot("tried").get_axes()
+    assert "commands act late" in str(notebook.show(verdict))
+    assert "<img alt='The gap on recordings set aside'" in notebook.show(verdict)._repr_html_()
+    assert notebook.plot(verdict, "tried").get_axes()
     with pytest.raises(InputError, match="picture: found 'nonsense', expected one of gap, where"):
-        verdict.plot("nonsense")
-
-
-def test_the_room_itself_gives_a_notebook_what_it_needs() -> None:
-    assert reality.discover is discover
-    assert all(getattr(reality, name) for name in reality.__all__)
+        notebook.plot(verdict, "nonsense")
 
 
 def test_a_formula_added_to_a_replay_takes_its_speed_error_away() -> None:

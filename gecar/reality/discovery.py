@@ -1,7 +1,7 @@
 """Discover: from a case's recordings to a verdict on what the simulation lacks.
 
 verdict = discover(read_case("recordings/monday"))
-print(verdict)
+verdict.effects, verdict.robot
 """
 
 from __future__ import annotations

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gecar.errors import expected
 from gecar.reality.materiality import Size
 from gecar.world.robot import Robot
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
@@ -206,29 +201,6 @@ class Verdict:
     notes: tuple[str, ...] = ()
     evidence: Any = field(default=None, repr=False)
 
-    def __str__(self) -> str:
-        """Return the verdict in words."""
-        return "\n\n".join(_above("report.verdict").words(self))
-
-    def _repr_html_(self) -> str:
-        """Return the verdict as a notebook shows it: words, tables, and how much of the gap is closed."""
-        png = _above("plots.style").picture(self.plot())
-        return str(_above("report.verdict_page").verdict_html(self, {"gap": png}))
-
-    def plot(self, picture: str = "gap") -> Figure:
-        """Draw one of the verdict's pictures: ``gap``, ``where``, ``tried``, ``traces`` or, with poses, ``map``.
-
-        Raises
-        ------
-        InputError
-            If there is no such picture.
-        """
-        drawings = _above("plots.reality.verdict").verdict_drawings(self)
-        if picture not in drawings:
-            raise expected("picture", f"'{picture}'", f"one of {', '.join(drawings)}")
-        figure: Figure = drawings[picture](self)
-        return figure
-
     def as_json(self) -> dict[str, Any]:
         """Return the contents of ``verdict.json``."""
         judged = self.judgement
@@ -278,11 +250,6 @@ def size_json(size: Size) -> dict[str, float | None]:
         "deg_1m": size.deg_1m,
         "reading_pct": size.reading_pct,
     }
-
-
-def _above(module: str) -> Any:
-    """Return a module of the rooms that make words and pictures: no import, for this room must not need them."""
-    return import_module(f"gecar.{module}")
 
 
 def _residual_json(residual: Residual) -> dict[str, Any]:
