@@ -3,9 +3,11 @@ import pickle
 
 import numpy as np
 import pytest
+from shapely.geometry import Point
 
 from courses import make_course
 from gecar.world.course.course import COURSES, list_courses, load_course
+from gecar.world.course.line import strokes
 from gecar.world.robot import load_robot
 
 
@@ -54,7 +56,7 @@ def test_shipped_courses_are_whole(name):
     assert course.centreline.geom_type == "LineString"
     assert 0 < course.shortest.length_m <= course.length_m + 0.1
     assert course.start_tile == course.layout.index_at(course.start.x_m, course.start.y_m)
-    assert course.distance_to_line(course.start.x_m, course.start.y_m) == pytest.approx(0.025)
+    assert strokes(course.layout).distance(Point(course.start.x_m, course.start.y_m)) == pytest.approx(0.025)
 
 
 def test_the_papers_course_is_listed_first_with_seven_harder_ones():
@@ -77,10 +79,6 @@ def test_the_centreline_runs_from_beside_start_to_goals_edge(paper):
     assert paper.centreline.coords[0] == pytest.approx((0.15, 0.75))
     assert paper.centreline.coords[-1] == pytest.approx((0.15, 0.30))
     assert paper.length_m == pytest.approx(2 * (2.1 + 0.9) - 0.45)
-
-
-def test_distance_to_the_line_is_to_its_middle(paper):
-    assert paper.distance_to_line([1.2, 0.15], [0.6, 0.6]) == pytest.approx([0.45, 0.0])
 
 
 def test_the_start_offset_is_as_the_robot_sees_it():

@@ -59,6 +59,6 @@ def notes_on(
 
 def _start(run: RecordingResiduals) -> str:
     assert run.nuisances.start is not None
-    x, y, heading = run.nuisances.start.start
+    x, y, heading = run.nuisances.start
     degrees = np.degrees(heading) % 360.0
     return f"{run.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.start_pose.localise import StartPose
-
 Array = npt.NDArray[np.float64]
 
 
@@ -45,7 +43,7 @@ class Nuisances:
     mark
         Place of the camera's mark on the robot: ahead, left [m], turned [rad].
     start
-        Start pose found from readings, where no camera looked; None: not found, or not needed.
+        Start pose found from readings, where no camera looked [m, m, rad], shape (3,); None: not found, or not needed.
     bare_floor
         Rows at which a recording of unknown place read even floor, shape (rows,); None: not needed.
     path
@@ -54,6 +52,6 @@ class Nuisances:
 
     clock_offset_s: float = 0.0
     mark: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    start: StartPose | None = None
+    start: npt.NDArray[np.float64] | None = None
     bare_floor: npt.NDArray[np.bool_] | None = None
     path: SensorPath | None = None

@@ -85,7 +85,7 @@ class RecordingResiduals:
         if not any(np.isnan(angles).all() for angles in encoders):
             path = odometry(self.replayer, physics)
             start = find_start(self.replayer.t, path, readings, self.course, physics)
-        bare = None if start else bare_floor(self.replayer.t, readings, self.noise.reflection_sd)
+        bare = bare_floor(self.replayer.t, readings, self.noise.reflection_sd) if start is None else None
         return self.with_nuisances(replace(self.nuisances, start=start, bare_floor=bare))
 
     def with_path(self, physics: Physics, inflation: Array) -> RecordingResiduals:
@@ -163,7 +163,7 @@ class RecordingResiduals:
     def _sensor_poses(self, physics: Physics) -> tuple[Array, float]:
         """Return the poses at every row, shape (rows, 3), and how late their clock is taken to be [s]."""
         if self.nuisances.start is not None:
-            return starting_at(odometry(self.replayer, physics), self.nuisances.start.start), 0.0
+            return starting_at(odometry(self.replayer, physics), self.nuisances.start), 0.0
         if self.nuisances.bare_floor is not None:
             return np.full((len(self.replayer.t), 3), OFF_COURSE_M), 0.0
         late = float(physics["pose_delay"][0]) + self.nuisances.clock_offset_s

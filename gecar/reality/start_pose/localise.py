@@ -7,7 +7,6 @@ sharper floors. A start counts where no other fits nearly as well, but those tha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,29 +35,13 @@ OTHER_WHEELS_GAIN, FITS_PCT = (
 )  # a misfit so many times smaller, and as small, with other wheels: they are other
 LEAST_CONTRAST = 5.0  # standard deviation of readings along the path [%]: less has not crossed a line
 KNEE_PCT = 5.0  # misfits this large and larger count less than their squares
-# Standard deviations of a start's pose that is told [m, m, rad].
+# Standard deviations of a start pose that is found [m, m, rad].
 LEAST_KNOWN = np.array([0.004, 0.004, math.radians(1.0)])
 CORRELATED = 10.0  # readings that are wrong together: one crossing is one event
 RIVAL_COST = 1.5  # times the best fit's cost: a rival's
 SAME_PCT = 2.0  # readings that differ by less do not tell two places apart
 # Over so long readings of even floor change by less, in percent and in their noise.
 EVEN_S, EVEN_PCT, EVEN_SD = 0.5, 4.0, 6.0
-
-
-@dataclass(frozen=True)
-class StartPose:
-    """Where a recording began.
-
-    Attributes
-    ----------
-    start
-        Pose of the axle's centre [m, m, rad], shape (3,).
-    misfit
-        Typical misfit of a reading [%].
-    """
-
-    start: Array
-    misfit: float
 
 
 def starting_at(path: Array, start: Array) -> Array:
@@ -93,8 +76,8 @@ def with_other_wheels(path: Array, change: Array) -> Array:
     return starting_at(np.column_stack([x, y, heading]), path[0] + change[:3])
 
 
-def find_start(t: Array, path: Array, readings: Array, course: Course, physics: Physics) -> StartPose | None:
-    """Return where a recording began; None where its readings do not tell.
+def find_start(t: Array, path: Array, readings: Array, course: Course, physics: Physics) -> Array | None:
+    """Return where a recording began [m, m, rad], shape (3,); None where its readings do not tell.
 
     Parameters
     ----------
@@ -128,7 +111,8 @@ def find_start(t: Array, path: Array, readings: Array, course: Course, physics: 
     others = readings_misfit.typical(readings_misfit.refined(nearest, WITH_WHEELS)[0])
     if others < FITS_PCT and misfit > OTHER_WHEELS_GAIN * others:
         return None
-    return StartPose(nearest[0], misfit)
+    start: Array = nearest[0]
+    return start
 
 
 def _sampled(path: Array, readings: Array, physics: Physics) -> tuple[Array, Array]:

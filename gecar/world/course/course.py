@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 
 from gecar.errors import InputError, expected
@@ -148,12 +147,6 @@ class Course:
         """Return a lower bound on a robot's time to GOAL [s], proven for tyres that hold (`fastest_time`)."""
         free_to_turn = len(self.walls) == 0 and not self.obstacles
         return fastest_time(self.shortest, self.start.heading_rad, robot, free_to_turn)
-
-    def distance_to_line(self, x_m: npt.ArrayLike, y_m: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return the distance of points [m] to the middle of the nearest line as drawn; nan without one."""
-        everything = line.strokes(self.layout)
-        points = shapely.points(np.asarray(x_m, np.float64), np.asarray(y_m, np.float64))
-        return np.asarray(shapely.distance(everything, points))
 
     def raster(self, pitch_m: float = PITCH_M) -> npt.NDArray[np.uint8]:
         """Return the floor's brightness; kept, so do not write into it.
