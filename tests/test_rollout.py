@@ -168,6 +168,13 @@ def test_stepped_robot_drives_as_the_program_does():
     assert robot.pose == pytest.approx((trace["x_m"][n], trace["y_m"][n], trace["heading_rad"][n]), abs=1e-12)
 
 
+def test_a_stepped_robots_sensor_has_noise():
+    robot = SteppedRobot(World(EV3, PAPER, noise=Noise(sensor_pct=5.0)))
+    readings = np.array([robot.reflection_pct for _ in range(400)])
+    assert np.mean(readings == 100.0) == pytest.approx(0.5 + 0.04, abs=0.08)  # half of them err upwards
+    assert readings[readings < 100.0].mean() == pytest.approx(100.0 - 5.0 * np.sqrt(2.0 / np.pi), abs=1.0)
+
+
 def test_a_stepped_robots_motors_have_noise_as_a_programs_do():
     noisy = World(EV3, PAPER, noise=Noise(motor_share=0.1))
     trace = simulate(noisy, opcodes("motor(50,50,400)"), seed=3, trace=True).trace
