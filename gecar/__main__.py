@@ -20,7 +20,7 @@ def main() -> None:
         _end(f"error: {error}", 2)
     except KeyboardInterrupt:
         _end("stopped", 130)
-    except OSError as error:  # a file or folder that can not be read or written, a full disk
+    except OSError as error:  # a file or folder that cannot be read or written, a full disk
         if os.environ.get("GECAR_DEBUG"):
             raise
         _end(f"error: {error.filename or 'files'}: {error.strerror or error}", 2)

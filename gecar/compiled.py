@@ -1,4 +1,4 @@
-"""Numba, set up once: a cache that can not go stale, and two decorators for what is compiled.
+"""Numba, set up once: a cache that cannot go stale, and two decorators for what is compiled.
 
 Numba's own ``cache=True`` looks only at the file a function stands in. When a compiled callee in *another* file
 changes, the stale caller is loaded and gives the old answer. So the cache lives in a folder named by a hash of every

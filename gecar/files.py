@@ -37,7 +37,7 @@ def write_whole(path: Path, content: str | bytes, durable: bool = True) -> None:
     Raises
     ------
     OSError
-        If the folder can not be written or the disk is full; the old file is then untouched.
+        If the folder cannot be written or the disk is full; the old file is then untouched.
     """
     raw = content.encode() if isinstance(content, str) else content
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

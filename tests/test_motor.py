@@ -21,13 +21,13 @@ def free_speed(duty):
     return math.degrees(max(duty * EV3.battery.voltage - lost, 0.0) / motor.back_emf_constant)
 
 
-def test_told_a_power_the_motor_settles_where_torque_and_friction_balance():
+def test_under_a_duty_command_the_motor_settles_where_torque_and_friction_balance():
     levels = (0, 3, 10, 40, 80, 100)
     wanted = [free_speed(min(level, 80) / 100.0) for level in levels]
     assert np.allclose(settled_speeds(altered(EV3, "duty"), levels), wanted, atol=0.1)
 
 
-def test_told_a_speed_it_turns_ten_degrees_a_second_for_each_percent_up_to_the_limit():
+def test_under_a_speed_command_it_turns_ten_degrees_a_second_for_each_percent_up_to_the_limit():
     assert np.allclose(
         settled_speeds(altered(EV3, "speed"), (10, 55, 80, 100)), [100, 550, 800, 800], atol=0.5
     )
@@ -68,7 +68,9 @@ def regulated_speeds(inertia_scale, step_s, command=0.5, seconds=1.5):
 
 @pytest.mark.parametrize("step_s", [0.00025, 0.002, 0.01])
 @pytest.mark.parametrize("inertia_scale", [1e-6, 1e-3, 0.03, 0.158, 0.16, 1.0, 4.0])
-def test_a_regulated_wheel_of_any_inertia_goes_the_right_way_and_settles_where_told(inertia_scale, step_s):
+def test_a_regulated_wheel_of_any_inertia_goes_the_right_way_and_settles_where_commanded(
+    inertia_scale, step_s
+):
     wanted = math.radians(500.0)
     speeds = regulated_speeds(inertia_scale, step_s)
     assert speeds.min() >= 0.0
@@ -92,7 +94,7 @@ def test_recordings_stand_beside_the_simulation(gecar, tmp_path):
         (bench / f"{name}.toml").write_text('rig = "bench"\n')
     answer = gecar("motor", bench, "--json").json
     assert answer["recorded_deg_s"]["motor x"] == pytest.approx({"40.0": 310.0, "60.0": 500.0})
-    assert answer["told_a_power_deg_s"]["100.0"] == pytest.approx(800.0, abs=0.1)
+    assert answer["duty_command_deg_s"]["100.0"] == pytest.approx(800.0, abs=0.1)
     assert (tmp_path / "motor.png").exists()
 
 

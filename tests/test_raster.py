@@ -106,7 +106,7 @@ def test_a_scan_at_a_wrong_scale_is_refused(tmp_path):
 
 def test_what_is_no_picture_is_refused(tmp_path):
     (tmp_path / "scan.png").write_bytes(b"\x89PNG\r\n\x1a\nnonsense")
-    with pytest.raises(InputError, match="can not be read"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_image(tmp_path / "scan.png", "here")
     with pytest.raises(InputError, match="no file"):
         read_image(tmp_path / "none.png", "here")

@@ -13,12 +13,12 @@ WORLD, RUN = "World", "Run"
 
 CourseOption = Annotated[
     str | None,
-    typer.Option("--course", metavar="NAME|FILE", help="Where to drive; [bold]gecar course list[/] names them.",
+    typer.Option("--course", metavar="NAME|FILE", help="Course; [bold]gecar course list[/] lists them.",
                  show_default="paper", rich_help_panel=WORLD),
 ]  # fmt: skip
 RobotOption = Annotated[
     str | None,
-    typer.Option("--robot", metavar="NAME|FILE", help="Who drives; [bold]gecar robot list[/] names them.",
+    typer.Option("--robot", metavar="NAME|FILE", help="Robot; [bold]gecar robot list[/] lists them.",
                  show_default="ev3", rich_help_panel=WORLD),
 ]  # fmt: skip
 NoiseOption = Annotated[
@@ -28,22 +28,22 @@ NoiseOption = Annotated[
 ]  # fmt: skip
 MotorNoiseOption = Annotated[
     float | None,
-    typer.Option("--motor-noise", metavar="PCT", help="Standard deviation of the motors' strength, in percent.",
+    typer.Option("--motor-noise", metavar="PCT", help="Standard deviation of each motor command, in percent of it.",
                  show_default="0", rich_help_panel=WORLD),
 ]  # fmt: skip
 TimeLimitOption = Annotated[
     float | None,
-    typer.Option("--time-limit", metavar="S", help="When a drive ends without GOAL, in seconds.",
+    typer.Option("--time-limit", metavar="S", help="Time after which a drive without GOAL ends, in seconds.",
                  show_default="60", rich_help_panel=WORLD),
 ]  # fmt: skip
 EngineOption = Annotated[
     str | None,
     typer.Option("--engine", metavar="auto|inline|pymunk", rich_help_panel=WORLD, show_default="auto",
-                 help="What moves the body; auto: pymunk where the course has something to touch."),
+                 help="Physics engine for the body; auto: pymunk on courses with walls or obstacles."),
 ]  # fmt: skip
 SchedulerOption = Annotated[
     str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler; default: a cluster on this machine.",
                  show_default=False, rich_help_panel=RUN),
 ]  # fmt: skip
 NoPicturesOption = Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.", rich_help_panel=RUN)]

@@ -83,7 +83,7 @@ class DaskExecutor(Executor):
         Raises
         ------
         InputError
-            If one of them can not.
+            If one of them cannot.
         """
         lacking = [worker for worker, has in self._client.run(importable, module).items() if not has]
         if lacking:
@@ -92,7 +92,7 @@ class DaskExecutor(Executor):
 
     def why_waiting(self) -> str:
         """Return a sentence if no worker is left; Dask waits until one comes."""
-        with suppress(OSError):  # a scheduler that goes away meanwhile is told of by the batches
+        with suppress(OSError):  # a scheduler that goes away meanwhile is reported by the batches
             if self._client.status != "running" or sum(self._client.ncores().values()):
                 return ""
         return f"{self._where} has no worker left; waiting for one (dask worker ADDRESS), Ctrl-C ends the run"
@@ -138,7 +138,7 @@ class DaskExecutor(Executor):
         """Return an error in one line if the scheduler could not import what was sent."""
         if not isinstance(error, ImportError) and "deserializ" not in str(error):
             return None
-        found = f"{self._where}, where what was sent can not be imported"
+        found = f"{self._where}, where what was sent cannot be imported"
         return expected(
             "--scheduler", found, "scheduler and workers with all that is installed here, or on PYTHONPATH"
         )

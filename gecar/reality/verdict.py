@@ -40,7 +40,7 @@ class Found:
     id
         Its identifier.
     alternatives
-        Effects these recordings can not tell from it.
+        Effects these recordings cannot tell from it.
     parameters
         By label.
     holdout_gain

@@ -11,8 +11,8 @@ Speeds = Mapping[float, float]
 
 
 def motor_table(regulated: Speeds, powered: Speeds, bench: Mapping[str, Speeds]) -> Table:
-    """Return a row for each level: the simulated motor told a speed, told a power, and real ones told that power."""
-    table = Table("level [%]", "told a speed [deg/s]", "told a power [deg/s]", box=None, pad_edge=False)
+    """Return a row for each level: the simulated motor's speeds, and those of real ones under duty commands."""
+    table = Table("level [%]", "speed command [deg/s]", "duty command [deg/s]", box=None, pad_edge=False)
     for name in bench:
         table.add_column(f"{name} [deg/s]")
     for column in table.columns:

@@ -60,7 +60,7 @@ class Saver:
         Raises
         ------
         InputError
-            If it can not be written.
+            If it cannot be written.
         """
         if self._unsaved is not None:
             self.folder.save(self._unsaved, self.configuration)

@@ -190,7 +190,7 @@ def write_table(path: Path, table: FitnessTable) -> None:
     Raises
     ------
     InputError
-        If it can not be written.
+        If it cannot be written.
     """
     rows = {"versions": table.versions, "drive": table.drives, "search": table.searches}
     text = tomli_w.dumps({name: found for name, found in rows.items() if found})

@@ -55,7 +55,7 @@ class RunFolder:
         Raises
         ------
         InputError
-            If it exists, or can not be made.
+            If it exists, or cannot be made.
         """
         check_new(path)
         temporary = None
@@ -94,7 +94,7 @@ class RunFolder:
         Raises
         ------
         InputError
-            If it can not be written; what was written before stays.
+            If it cannot be written; what was written before stays.
         """
         try:
             write_whole(self.path / name, content, durable)

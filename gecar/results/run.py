@@ -187,7 +187,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     Raises
     ------
     InputError
-        If a file can not be written, or workers die again and again.
+        If a file cannot be written, or workers die again and again.
     KeyboardInterrupt
         On Ctrl-C, after the reports are written and the way to go on is printed.
     """

@@ -188,7 +188,7 @@ class StudyFolder:
         Raises
         ------
         InputError
-            If it exists and ``again`` is not asked for, or can not be made.
+            If it exists and ``again`` is not asked for, or cannot be made.
         """
         if not again and (self.path.exists() or self.path.is_symlink()):
             raise expected("--out", f"{self.path}, which exists", "a new folder, or --resume to go on in it")
@@ -207,7 +207,7 @@ class StudyFolder:
         Raises
         ------
         InputError
-            If it can not be written.
+            If it cannot be written.
         """
         place = self.runs / run.file
         try:

@@ -64,7 +64,7 @@ def perform_all(
     Raises
     ------
     InputError
-        If a file can not be written, or workers die again and again.
+        If a file cannot be written, or workers die again and again.
     KeyboardInterrupt
         On Ctrl-C, when the workers are gone; what was finished is kept.
     """

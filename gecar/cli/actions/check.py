@@ -1,4 +1,4 @@
-"""A fitness table for ``gecar check``: run again, compared, and told."""
+"""A fitness table for ``gecar check``: run again, compared, and reported."""
 
 from __future__ import annotations
 

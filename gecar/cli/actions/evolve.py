@@ -1,4 +1,4 @@
-"""A run of ``gecar evolve``, from its start to what is told of it."""
+"""A run of ``gecar evolve``, from its start to its report."""
 
 from __future__ import annotations
 

@@ -62,8 +62,8 @@ def draw_motor(output: Output, benches: Sequence[Path], robot_name: str, out: Pa
         {
             "robot": robot.name,
             "limit_pct": cap,
-            "told_a_speed_deg_s": regulated,
-            "told_a_power_deg_s": powered,
+            "speed_command_deg_s": regulated,
+            "duty_command_deg_s": powered,
             "without_cap_deg_s": uncapped,
             "recorded_deg_s": recorded,
             "picture": str(out),

@@ -54,7 +54,7 @@ def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
     Raises
     ------
     InputError
-        If the folder is no finished run's, or what it names can not be loaded.
+        If the folder is no finished run's, or what it names cannot be loaded.
     """
     target = out or folder
     target.mkdir(parents=True, exist_ok=True)

@@ -15,19 +15,19 @@ def calibrate(
         Path, typer.Argument(metavar="CASE", show_default=False, help="A folder of recordings of one robot.")
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Where robot.toml, calibration.json and the picture go.")
+        Path, typer.Option("--out", metavar="FOLDER", help="Folder for robot.toml, calibration.json and the picture.")
     ] = Path("calibrated"),
     holdout: Annotated[
         str, typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
-                          help="Recordings to judge on, with commas between; nothing is fitted on them."),
+                          help="Recordings to set aside for validation, separated by commas."),
     ] = "",
     robot: Annotated[
         str, typer.Option("--robot", metavar="NAME|FILE", show_default="what the recordings name",
-                          help="Where to start."),
+                          help="Robot whose constants the fit starts from."),
     ] = "",
     constants: Annotated[
         str, typer.Option("--constants", metavar="NAMES", show_default="the usual ones",
-                          help="Which to fit, as a robot file names them: battery.voltage,motor.inertia."),
+                          help="Constants to fit, named as in a robot file: battery.voltage,motor.inertia."),
     ] = "",
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw calibration.png.")] = True,
     as_json: JsonOption = False,

@@ -12,14 +12,14 @@ from gecar.cli.output import JsonOption, Output
 
 def check(
     table: Annotated[
-        Path, typer.Argument(metavar="TABLE.toml", help="The fitness table; rows without figures are new.")
+        Path, typer.Argument(metavar="TABLE.toml", help="The fitness table; --update fills in rows without figures.")
     ] = Path("benchmarks/fitness_table.toml"),
-    update: Annotated[bool, typer.Option("--update", help="Write the fresh figures, and say what changed.")] = False,
+    update: Annotated[bool, typer.Option("--update", help="Write the new figures to the table.")] = False,
     pins: Annotated[
-        bool, typer.Option("--pins", help="Only print the versions the table was made with, for pip install -r.")
+        bool, typer.Option("--pins", help="Only print the library versions of the table, for pip install -r.")
     ] = False,
     workers: Annotated[
-        int | None, typer.Option("--workers", help="Processes; the figures are the same for any number.",
+        int | None, typer.Option("--workers", help="Number of processes; it does not change the figures.",
                                  show_default="cores"),
     ] = None,
     as_json: JsonOption = False,

@@ -31,17 +31,17 @@ def compare(
     program: Annotated[
         Path | None,
         typer.Option("--program", metavar="FILE", show_default="what the recordings name",
-                     help="What drove: a program, or a run's folder. Without any, the recorded commands are replayed."),
+                     help="The program that drove, or a run folder. Without one, the recorded commands are replayed."),
     ] = None,
     course: CourseOption = None,
     robot: RobotOption = None,
     frame: Annotated[
         str,
         typer.Option("--frame", metavar="start|course",
-                     help="Compare positions from a common start, as the paper does, or in the course's frame."),
+                     help="Align positions at the start, as the paper does, or compare them in the course's frame."),
     ] = "start",
     out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Where compare.png, .md, .csv and .json go.")
+        Path, typer.Option("--out", metavar="FOLDER", help="Output folder for compare.png, .md, .csv and .json.")
     ] = Path("compared"),
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
     as_json: JsonOption = False,

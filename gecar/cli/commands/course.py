@@ -26,7 +26,7 @@ NameArgument = Annotated[
     str, typer.Argument(metavar="COURSE", help="A name or a course file (.toml).", show_default=False)
 ]
 RobotOption = Annotated[
-    str, typer.Option("--robot", metavar="NAME|FILE", help="For whom the lower bound holds.")
+    str, typer.Option("--robot", metavar="NAME|FILE", help="Robot that the lower bound is for.")
 ]
 
 
@@ -62,7 +62,9 @@ def show(
     robot: RobotOption = "ev3",
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw it: .png, .pdf or .svg.", show_default=False),
+        typer.Option(
+            "--picture", metavar="FILE", help="Draw it to a .png, .pdf or .svg file.", show_default=False
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -110,10 +112,13 @@ def print_out(
     name: NameArgument,
     paper: Annotated[
         str,
-        typer.Option("--paper", metavar="A4|A3|sheet", help="Paper; sheet: the whole course on one page."),
+        typer.Option(
+            "--paper", metavar="A4|A3|sheet", help="Paper size; sheet: the whole course on one page."
+        ),
     ] = "A4",
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Where to.", show_default="COURSE-PAPER.pdf")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Output file.", show_default="COURSE-PAPER.pdf"),
     ] = None,
     no_guides: Annotated[bool, typer.Option("--no-guides", help="Leave out tiles, START and GOAL.")] = False,
     as_json: JsonOption = False,
@@ -148,10 +153,12 @@ def print_out(
 @course.command()
 def new(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.toml.", show_default=False)
+        Path, typer.Argument(metavar="FILE", help="File to write, NAME.toml.", show_default=False)
     ],
-    size: Annotated[str, typer.Option("--size", metavar="COLUMNSxROWS", help="How many tiles.")] = "8x4",
-    tile: Annotated[float, typer.Option("--tile", metavar="M", help="Edge of a tile, in metres.")] = 0.30,
+    size: Annotated[str, typer.Option("--size", metavar="COLUMNSxROWS", help="Number of tiles.")] = "8x4",
+    tile: Annotated[
+        float, typer.Option("--tile", metavar="M", help="Edge length of a tile, in metres.")
+    ] = 0.30,
     as_json: JsonOption = False,
 ) -> None:
     """Write a course file to begin with: a loop with every field explained, to be edited by hand.

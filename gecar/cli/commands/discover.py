@@ -16,51 +16,51 @@ from gecar.reality.materiality import DEFAULT, Material
 def discover(
     cases: Annotated[
         list[Path],
-        typer.Argument(metavar="CASE...", show_default=False, help="Folders, each of recordings of one robot."),
+        typer.Argument(metavar="CASE...", show_default=False, help="Folders, each with recordings of one robot."),
     ],
     out: Annotated[
         Path,
         typer.Option("--out", metavar="FOLDER",
-                     help="Where verdict and pictures go; of several cases, a folder in it for each."),
+                     help="Output folder; with several cases, one subfolder for each."),
     ] = Path("verdict"),
     holdout: Annotated[
         str,
         typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
-                     help="Recordings to set aside for the proof, with commas between."),
+                     help="Recordings to set aside for validation, separated by commas."),
     ] = "",
     robot: Annotated[
         str,
-        typer.Option("--robot", metavar="NAME|FILE", help="The robot as it is known.",
+        typer.Option("--robot", metavar="NAME|FILE", help="The known robot: the simulation starts from its constants.",
                      show_default="what the recordings name"),
     ] = "",
-    seed: Annotated[int, typer.Option("--seed", help="Of every draw of chance.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Random seed.")] = 0,
     workers: Annotated[
-        int, typer.Option("--workers", help="Threads, or with --executor processes; 0: all cores.")
+        int, typer.Option("--workers", help="Number of threads, or of processes with --executor; 0: one per core.")
     ] = 0,
     executor: Annotated[
         str,
-        typer.Option("--executor", metavar="serial|process|dask", help="Where whole cases are looked at.",
+        typer.Option("--executor", metavar="serial|process|dask", help="How several cases are run.",
                      show_default="serial: in this process, one after the other"),
     ] = "",
     scheduler: Annotated[
         str,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Dask's scheduler; without it a cluster on this machine.",
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler; default: a cluster on this machine.",
                      show_default=False),
     ] = "",
     with_formula: Annotated[
         bool,
         typer.Option("--with-formula", show_default=False,
-                     help="Add a formula for what nothing explains to the replays, and show what it gains."),
+                     help="Add the formula for unexplained residuals to the replays, and report what it gains."),
     ] = False,
     material: Annotated[
         float,
         typer.Option("--material", metavar="MM",
-                     help="From how many millimetres over a metre on something matters (and degrees: a fifth of it)."),
+                     help="Smallest error that counts, in mm per metre driven (in degrees: a fifth of it)."),
     ] = DEFAULT.mm,
     program: Annotated[
         Path | None,
         typer.Option("--program", metavar="FILE", show_default=False,
-                     help="A program, or a run's folder, whose time of arrival shows what sizes mean."),
+                     help="A program or a run folder: report errors as changes of its arrival time, too."),
     ] = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 WordsArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[show] ID", help="One effect, with all that is known of it.", show_default=False),
+    typer.Argument(metavar="[show] ID", help="One effect in detail; show: draw it.", show_default=False),
 ]
 
 
@@ -23,9 +23,7 @@ def effects(
     words: WordsArgument = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="FILE", help="Where `show` draws its signature.", show_default="ID.png"
-        ),
+        typer.Option("--out", metavar="FILE", help="Output file of `show`.", show_default="ID.png"),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -40,16 +40,18 @@ def evolve(
     preset: Annotated[
         str | None, _search("--preset", "Search settings: better, paper (Table 4) or random.", "better", "NAME")
     ] = None,
-    population: Annotated[int | None, _search("--population", "Programs in a generation; paper: 200.")] = None,
-    generations: Annotated[int | None, _search("--generations", "Generations after the first; paper: 50.")] = None,
-    codons: Annotated[int | None, _search("--codons", "Codons in a genome, the gene length; paper: 1000.")] = None,
-    elites: Annotated[int | None, _search("--elites", "Best ones that stay as they are; paper: 1.")] = None,
-    tournament: Annotated[int | None, _search("--tournament", "Candidates of a selection; paper: 5.")] = None,
+    population: Annotated[int | None, _search("--population", "Programs per generation; paper: 200.")] = None,
+    generations: Annotated[
+        int | None, _search("--generations", "Number of generations after the initial one; paper: 50.")
+    ] = None,
+    codons: Annotated[int | None, _search("--codons", "Genome length in codons; paper: 1000.")] = None,
+    elites: Annotated[int | None, _search("--elites", "Number of elites, copied unchanged; paper: 1.")] = None,
+    tournament: Annotated[int | None, _search("--tournament", "Tournament size; paper: 5.")] = None,
     crossover_rate: Annotated[
-        float | None, _search("--crossover-rate", "Share of pairs that are crossed; paper: 0.4, 0.5, 0.7.")
+        float | None, _search("--crossover-rate", "Crossover rate, per pair; paper: 0.4, 0.5, 0.7.")
     ] = None,
     mutation_rate: Annotated[
-        float | None, _search("--mutation-rate", "Share of codons drawn anew; paper: 0.03, 0.05, 0.07.")
+        float | None, _search("--mutation-rate", "Mutation rate, per codon; paper: 0.03, 0.05, 0.07.")
     ] = None,
     setting: Annotated[
         list[str] | None,
@@ -65,11 +67,11 @@ def evolve(
     motor_noise: MotorNoiseOption = None,
     draws: Annotated[
         int | None,
-        _search("--draws", "Drives a program is judged by, under conditions drawn afresh; 1: the nominal drive alone.",
+        _search("--draws", "Drives per evaluation, under random conditions; 1: the nominal drive alone.",
                 "16; paper: 1", "K"),
     ] = None,
     share: Annotated[
-        float | None, _search("--share", "Share of its drives in which a program has to arrive.", "0.96")
+        float | None, _search("--share", "Share of drives that must arrive.", "0.96")
     ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
@@ -79,12 +81,12 @@ def evolve(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", help="Processes; the result is the same for any number.", show_default="cores",
+        typer.Option("--workers", help="Number of processes; it does not change the result.", show_default="cores",
                      rich_help_panel=RUN),
     ] = None,
     executor: Annotated[
         str | None,
-        typer.Option("--executor", metavar="process|thread|serial|dask", help="Where programs are simulated.",
+        typer.Option("--executor", metavar="process|thread|serial|dask", help="How programs are simulated in parallel.",
                      show_default="process", rich_help_panel=RUN),
     ] = None,
     scheduler: SchedulerOption = None,
@@ -94,7 +96,7 @@ def evolve(
                      show_default="runs/COURSE-PRESET-seedN", rich_help_panel=RUN),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the run in --out where it was stopped.", rich_help_panel=RUN)
+        bool, typer.Option("--resume", help="Continue the stopped run in --out.", rich_help_panel=RUN)
     ] = False,
     no_pictures: NoPicturesOption = False,
     quiet: QuietOption = False,

@@ -27,14 +27,14 @@ def export(
     target: Annotated[
         str,
         typer.Option("--target", metavar="pybricks2|pybricks4",
-                     help="What runs on the brick: EV3 MicroPython 2.0, or Pybricks 4."),
+                     help="Firmware of the brick: pybricks2 (EV3 MicroPython 2.0) or pybricks4."),
     ] = "pybricks2",
     robot: RobotOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Where the files go.", show_default="brick"),
+        typer.Option("--out", metavar="FOLDER", help="Output folder.", show_default="brick"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over files that are there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     left_motor: Annotated[str, _port("left-motor", "A to D; -B if it is mounted the other way round.")] = "B",
     right_motor: Annotated[str, _port("right-motor", "A to D, likewise.")] = "C",
     sensor: Annotated[str, _port("sensor", "1 to 4: SensorValue.")] = "3",

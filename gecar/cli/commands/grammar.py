@@ -31,13 +31,15 @@ GenomeArgument = Annotated[
     str,
     typer.Argument(
         metavar="GENOME", show_default=False,
-        help="Codons 0..255 with commas or spaces between; digits alone are a codon each, as in the paper's 302122.",
+        help="Codons 0..255, separated by commas or spaces; or one codon per digit, as in the paper's 302122.",
     ),
 ]  # fmt: skip
 WrapsOption = Annotated[int, typer.Option("--wraps", help="Maximum genome wraps.")]
 ConsumesOption = Annotated[
     bool,
-    typer.Option("--single-choice-consumes", help="A nonterminal with one alternative reads a codon, too."),
+    typer.Option(
+        "--single-choice-consumes", help="Nonterminals with a single alternative read a codon, too."
+    ),
 ]
 
 
@@ -92,7 +94,10 @@ def derive(
     picture: Annotated[
         Path | None,
         typer.Option(
-            "--picture", metavar="FILE", help="Draw it as a tree: .png, .pdf or .svg.", show_default=False
+            "--picture",
+            metavar="FILE",
+            help="Draw the derivation tree to a .png, .pdf or .svg file.",
+            show_default=False,
         ),
     ] = None,
     as_json: JsonOption = False,
@@ -142,11 +147,11 @@ def derive(
 def map_genomes(
     name: GrammarArgument,
     genome: Annotated[
-        str | None, typer.Argument(metavar="GENOME", help="Codons; without them, random genomes.")
+        str | None, typer.Argument(metavar="GENOME", help="Codons; default: random genomes.")
     ] = None,
-    count: Annotated[int, typer.Option("--count", help="How many random genomes.")] = 5,
-    length: Annotated[int, typer.Option("--codons", help="Codons in each of them.")] = 1000,
-    seed: Annotated[int, typer.Option("--seed", help="Which ones.")] = 1,
+    count: Annotated[int, typer.Option("--count", help="Number of random genomes.")] = 5,
+    length: Annotated[int, typer.Option("--codons", help="Codons of each random genome.")] = 1000,
+    seed: Annotated[int, typer.Option("--seed", help="Random seed.")] = 1,
     wraps: WrapsOption = 0,
     single_choice_consumes: ConsumesOption = False,
     as_json: JsonOption = False,

@@ -24,18 +24,16 @@ def plot(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FOLDER", help="Where the pictures go.", show_default="the run, or here"
+            "--out", metavar="FOLDER", help="Output folder for the pictures.", show_default="the run, or here"
         ),
     ] = None,
     tree: Annotated[
         Path | None,
-        _file("--tree", "Draw only what is named: the best program's derivation; .png, .pdf or .svg."),
+        _file("--tree", "Draw only the pictures named: the best program's derivation; .png, .pdf or .svg."),
     ] = None,
-    genealogy: Annotated[
-        Path | None, _file("--genealogy", "... who it descends from; .png, .pdf or .svg.")
-    ] = None,
+    genealogy: Annotated[Path | None, _file("--genealogy", "... its ancestors; .png, .pdf or .svg.")] = None,
     evolution: Annotated[
-        Path | None, _file("--evolution", "... a film of how the best one got better; .gif or .mp4.")
+        Path | None, _file("--evolution", "... a film of the best program by generation; .gif or .mp4.")
     ] = None,
     page: Annotated[
         bool,
@@ -104,7 +102,7 @@ def _study(output: Output, run: Path, out: Path, named: dict[str, Path | None], 
 
 
 def _check_endings(tree: Path | None, genealogy: Path | None, evolution: Path | None) -> None:
-    """Refuse what can not be drawn before anything is."""
+    """Refuse what cannot be drawn before anything is."""
     from gecar.plots.drives.animation import check_film
     from gecar.plots.style import picture_kind
 

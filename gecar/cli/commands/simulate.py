@@ -43,13 +43,13 @@ def simulate(
     motor_noise: MotorNoiseOption = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", help="Which noise.", show_default="as in the run, or 1", rich_help_panel="World"),
+        typer.Option("--seed", help="Seed of the noise.", show_default="as in the run, or 1", rich_help_panel="World"),
     ] = None,
     time_limit: TimeLimitOption = None,
     engine: EngineOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Where trajectory.png goes.", show_default="here",
+        typer.Option("--out", metavar="FOLDER", help="Output folder for trajectory.png.", show_default="here",
                      rich_help_panel=PICTURES),
     ] = None,
     picture: Annotated[
@@ -61,7 +61,7 @@ def simulate(
     colour: Annotated[
         str,
         typer.Option("--colour", metavar="auto|line|speed", rich_help_panel=PICTURES,
-                     help="What the way's colour says: the line of the program, or the speed."),
+                     help="Colour the path by the program's line or by speed."),
     ] = "auto",
     animate: Annotated[
         Path | None,
@@ -69,7 +69,7 @@ def simulate(
                      show_default=False, rich_help_panel=PICTURES),
     ] = None,
     pace: Annotated[
-        float, typer.Option("--pace", help="Seconds of driving in a second of film.", rich_help_panel=PICTURES)
+        float, typer.Option("--pace", help="Playback speed of the film; 2: twice real time.", rich_help_panel=PICTURES)
     ] = 1.0,
     page: Annotated[
         Path | None,
@@ -79,7 +79,7 @@ def simulate(
     record: Annotated[
         Path | None,
         typer.Option("--record", metavar="FILE", show_default=False, rich_help_panel=PICTURES,
-                     help="Keep the drive as a recording (.csv), to rehearse what is done with a real robot's."),
+                     help="Save the drive as a recording (.csv), in the format of a real robot's."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip

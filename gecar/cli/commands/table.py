@@ -34,12 +34,12 @@ def table(
     ] = None,
     rows: Annotated[
         str | None,
-        typer.Option("--rows", metavar="NAME=V1,V2,...", help="What varies from row to row: any setting.",
+        typer.Option("--rows", metavar="NAME=V1,V2,...", help="Setting varied over the rows, and its values.",
                      show_default="crossover_rate=0.4,0.5,0.7", rich_help_panel=GRID),
     ] = None,
     columns: Annotated[
         str | None,
-        typer.Option("--columns", metavar="NAME=V1,V2,...", help="What varies from column to column.",
+        typer.Option("--columns", metavar="NAME=V1,V2,...", help="Setting varied over the columns, and its values.",
                      show_default="mutation_rate=0.03,0.05,0.07", rich_help_panel=GRID),
     ] = None,
     seeds: Annotated[
@@ -48,20 +48,21 @@ def table(
     ] = None,
     first_seed: Annotated[
         int | None,
-        typer.Option("--first-seed", min=0, help="Seed of the first of them.", show_default="1", rich_help_panel=GRID),
+        typer.Option("--first-seed", min=0, help="First seed.", show_default="1", rich_help_panel=GRID),
     ] = None,
     preset: Annotated[
         str | None,
-        typer.Option("--preset", metavar="NAME", help="Search settings that the rest starts from.",
+        typer.Option("--preset", metavar="NAME", help="Preset of the search settings.",
                      show_default="paper", rich_help_panel=SEARCH),
     ] = None,
     population: Annotated[
         int | None,
-        typer.Option("--population", help="Programs in a generation.", show_default=False, rich_help_panel=SEARCH),
+        typer.Option("--population", help="Programs per generation.", show_default=False, rich_help_panel=SEARCH),
     ] = None,
     generations: Annotated[
         int | None,
-        typer.Option("--generations", help="Generations after the first.", show_default=False, rich_help_panel=SEARCH),
+        typer.Option("--generations", help="Number of generations after the initial one.", show_default=False,
+                     rich_help_panel=SEARCH),
     ] = None,
     setting: Annotated[
         list[str] | None,
@@ -81,11 +82,11 @@ def table(
     engine: EngineOption = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", help="Runs side by side; the table is the same for any number.",
+        typer.Option("--workers", help="Number of runs in parallel; it does not change the table.",
                      show_default="cores", rich_help_panel=RUN),
     ] = None,
     executor: Annotated[
-        str, typer.Option("--executor", metavar="process|thread|serial|dask", help="Where runs are performed.",
+        str, typer.Option("--executor", metavar="process|thread|serial|dask", help="How runs are executed in parallel.",
                           rich_help_panel=RUN),
     ] = "process",
     scheduler: SchedulerOption = None,
@@ -96,7 +97,7 @@ def table(
     ] = None,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Go on in --out: finished runs are kept, the grid may have grown.",
+        typer.Option("--resume", help="Continue in --out: finished runs are kept, and the grid may be larger.",
                      rich_help_panel=RUN),
     ] = False,
     no_pictures: NoPicturesOption = False,

@@ -126,7 +126,7 @@ def _corner_mm(course: Course, tile: int) -> Point:
 
 
 class _Page:
-    """A page of paper to draw on in millimetres from its lower left corner; it draws in the order it is told to."""
+    """A page of paper to draw on in millimetres from its lower left corner; drawn in the order of the calls."""
 
     def __init__(self, size: tuple[float, float]) -> None:
         self.figure = Figure(figsize=(size[0] / _MM_PER_INCH, size[1] / _MM_PER_INCH))

@@ -1,4 +1,4 @@
-"""Time series of a drive: what the sensor saw, what the motors were told, how fast the wheels turned."""
+"""Time series of a drive: sensor reading, motor commands, wheel speeds."""
 
 from __future__ import annotations
 

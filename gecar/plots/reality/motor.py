@@ -1,4 +1,4 @@
-"""A motor's speed against what it is told: the paper's Figs 7 and 8."""
+"""A motor's speed against its command: the paper's Figs 7 and 8."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def motor_speed(
     Parameters
     ----------
     regulated, powered, uncapped
-        The simulated motor: told a speed, told a power, and told a power without the cap.
+        The simulated motor: under speed commands, duty commands, and duty commands without the cap.
     bench
         Real motors by name, by power.
     cap_pct

@@ -1,4 +1,4 @@
-"""Calibrate: fit a robot's own constants to recordings, say which of them the recordings can not tell.
+"""Calibrate: fit a robot's own constants to recordings, say which of them the recordings cannot tell.
 
 result = calibrate(read_case("recordings/monday"))
 write_robot(result.robot, Path("robot.toml"))
@@ -25,7 +25,7 @@ from scipy.stats import t as student
 
 from gecar.reality.calibrate.constant_fit import fitted
 from gecar.reality.calibrate.constants import MARK, Constant, FreeConstants, chosen, with_constants
-from gecar.reality.calibrate.identifiability import BLIND, at_bounds, sensitivities, told_apart
+from gecar.reality.calibrate.identifiability import BLIND, at_bounds, identifiable, sensitivities
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.camera_frame import corrected
@@ -205,7 +205,7 @@ def _fit_constants(residuals: Residuals, robot: Robot, constants: tuple[Constant
     """Fit the constants a residuals tells; which they are is asked again where the fit ended."""
     everything = FreeConstants(robot, constants)
     z = np.zeros(len(constants))
-    told, reasons = np.zeros(len(constants), bool), dict.fromkeys(range(len(constants)), BLIND)
+    identified, reasons = np.zeros(len(constants), bool), dict.fromkeys(range(len(constants)), BLIND)
     if not constants or not residuals.recordings or not len(everything.errors(residuals, z)):
         return _Constants(
             (),
@@ -216,13 +216,13 @@ def _fit_constants(residuals: Residuals, robot: Robot, constants: tuple[Constant
         )
     pressed: dict[int, str] = {}
     for _ in range(ROUNDS):
-        found, reasons = told_apart(residuals, everything, z, pressed)
-        if (found == told).all():
+        found, reasons = identifiable(residuals, everything, z, pressed)
+        if (found == identified).all():
             break
-        told = found
-        z = fitted(residuals, everything, told, np.where(told, z, 0.0))
-        pressed |= at_bounds(everything, z, told)
-    spread = _spread(residuals, everything, z, told)
+        identified = found
+        z = fitted(residuals, everything, identified, np.where(identified, z, 0.0))
+        pressed |= at_bounds(everything, z, identified)
+    spread = _spread(residuals, everything, z, identified)
     values = everything.values(z)
     ends = [
         np.clip(everything.values(z + side * spread), [c.low for c in constants], [c.high for c in constants])
@@ -230,29 +230,29 @@ def _fit_constants(residuals: Residuals, robot: Robot, constants: tuple[Constant
     ]
     return _Constants(
         tuple(FittedConstant(c, float(everything.standing[k]), float(values[k]), float(ends[0][k]), float(ends[1][k]))
-              for k, c in enumerate(constants) if told[k]),
+              for k, c in enumerate(constants) if identified[k]),
         tuple(UnknownConstant(c, float(everything.standing[k]), reasons[k])
-              for k, c in enumerate(constants) if not told[k]),
+              for k, c in enumerate(constants) if not identified[k]),
     )  # fmt: skip
 
 
 def _spread(
-    residuals: Residuals, free_constants: FreeConstants, z: Array, told: npt.NDArray[np.bool_]
+    residuals: Residuals, free_constants: FreeConstants, z: Array, identified: npt.NDArray[np.bool_]
 ) -> Array:
     """Return half the 95 % intervals in steps, shape (k,): a jackknife over recordings, or spans of them.
 
-    Where there are recordings enough, the wider of both: a constant that one or two of them tell is told by few groups.
+    Where there are recordings enough, the wider of both: few groups determine a constant that few recordings show.
     """
     errors, slopes = sensitivities(residuals, free_constants, z)
-    slopes = slopes[:, told]
+    slopes = slopes[:, identified]
     halves = [_half_width(errors, slopes, groups) for groups in _groupings(residuals)]
     out = np.zeros(len(z))
-    out[told] = np.hypot(np.max(halves, axis=0), TRUST_STEPS)
+    out[identified] = np.hypot(np.max(halves, axis=0), TRUST_STEPS)
     return out
 
 
 def _half_width(errors: Array, slopes: Array, groups: npt.NDArray[np.int64]) -> Array:
-    """Return half the 95 % intervals by leaving out one group after the other, shape (told,)."""
+    """Return half the 95 % intervals by leaving out one group after the other, shape (identified,)."""
     normal = slopes.T @ slopes
     leaps = []
     for group in np.unique(groups):

@@ -31,43 +31,43 @@ _AGAIN, _WORTH = (
 )  # fits more, and the share of its cost by which one must help to be followed by another
 
 
-def fitted(residuals: Residuals, constants: FreeConstants, told: Chosen, last: Array) -> Array:
-    """Return the vector that fits best, 0 where a constant is not told, shape (k,).
+def fitted(residuals: Residuals, constants: FreeConstants, identified: Chosen, last: Array) -> Array:
+    """Return the vector that fits best, 0 where a constant is not identified, shape (k,).
 
     Parameters
     ----------
     residuals, constants
         What to fit, and with which constants.
-    told
+    identified
         Which of them are free, shape (k,).
     last
         Where the last fit ended, with others free: the next begins there; all 0 for none.
     """
-    if not told.any():
-        return np.zeros(len(told))
-    starts = [last] if last.any() else _starts(residuals, constants, told)
-    ends = [_from(residuals, constants, told, start) for start in starts]
-    return _whole(np.zeros(len(told)), told, min(ends, key=lambda end: end.cost).z)
+    if not identified.any():
+        return np.zeros(len(identified))
+    starts = [last] if last.any() else _starts(residuals, constants, identified)
+    ends = [_from(residuals, constants, identified, start) for start in starts]
+    return _whole(np.zeros(len(identified)), identified, min(ends, key=lambda end: end.cost).z)
 
 
-def _starts(residuals: Residuals, constants: FreeConstants, told: Chosen) -> Iterator[Array]:
-    begin = np.zeros(len(told))
+def _starts(residuals: Residuals, constants: FreeConstants, identified: Chosen) -> Iterator[Array]:
+    begin = np.zeros(len(identified))
     if not residuals.sensor:
         yield begin
         return
-    levels = told & _named(constants.constants, _LEVELS)
+    levels = identified & _named(constants.constants, _LEVELS)
     if levels.any():
         begin = _whole(begin, levels, _from(residuals, constants, levels, begin).z)
     yield begin
     for names in _PLACES:
-        begin = _scanned(residuals, constants, told & _named(constants.constants, names), begin)
+        begin = _scanned(residuals, constants, identified & _named(constants.constants, names), begin)
         yield begin
 
 
 def _from(residuals: Residuals, constants: FreeConstants, free: Chosen, start: Array) -> Minimum:
     """Fit from a start; sight again from its end with finer differences, until that helps no more.
 
-    The sensor's place and the course's are told apart by corners only: a long, narrow valley, in which a fit with
+    The sensor's place and the course's are separated by corners only: a long, narrow valley, in which a fit with
     coarse differences stops short.
     """
     low, high = constants.bounds

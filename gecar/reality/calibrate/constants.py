@@ -1,7 +1,7 @@
 """The robot's own constants that recordings can calibrate: which there are, and how a robot takes new ones.
 
 Beside them stands what the camera that filmed it has of its own: where its mark sits on the robot, and where its frame
-has the course. That is fitted so that it can not bend the robot's constants, and goes into no robot file.
+has the course. That is fitted so that it cannot bend the robot's constants, and goes into no robot file.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Constant:
 
 MARK = ("mark_ahead", "mark_left", "mark_turn")  # of a camera's mark on the robot
 
-# In the order in which they are trusted: of constants that recordings can not tell apart, the first is fitted. Steps
+# In the order in which they are trusted: of constants that recordings cannot tell apart, the first is fitted. Steps
 # are the smallest changes worth a name (`gecar.world.effects`); bounds are what a small robot could have.
 CONSTANTS = (
     Constant("battery", "voltage", "voltage", "battery voltage", "V", 3.0, 13.0, 0.05),

@@ -17,7 +17,7 @@ from gecar.reality.residuals.of_case import Residuals
 Array = npt.NDArray[np.float64]
 
 PROBE = 0.4  # of a step, for differences
-# A constant whose effect is that of others to within this sine of an angle can not be told from them.
+# A constant whose effect is that of others to within this sine of an angle cannot be identified.
 LEAST_SINE = 0.1
 # Nor is one worth a number whose interval reaches further than so many of its steps either way.
 WIDEST_STEPS = 25.0
@@ -33,10 +33,10 @@ def sensitivities(residuals: Residuals, free_constants: FreeConstants, z: Array)
     return errors * root, slopes * root[:, None]
 
 
-def at_bounds(free_constants: FreeConstants, z: Array, told: npt.NDArray[np.bool_]) -> dict[int, str]:
+def at_bounds(free_constants: FreeConstants, z: Array, identified: npt.NDArray[np.bool_]) -> dict[int, str]:
     """Return the constants a fit pressed against a bound, which is no measurement of them."""
     low, high = free_constants.bounds
-    at = [k for k in np.flatnonzero(told) if not low[k] + 1e-6 < z[k] < high[k] - 1e-6]
+    at = [k for k in np.flatnonzero(identified) if not low[k] + 1e-6 < z[k] < high[k] - 1e-6]
     return {
         int(
             k
@@ -45,7 +45,7 @@ def at_bounds(free_constants: FreeConstants, z: Array, told: npt.NDArray[np.bool
     }
 
 
-def told_apart(
+def identifiable(
     residuals: Residuals, free_constants: FreeConstants, z: Array, pressed: Mapping[int, str]
 ) -> tuple[npt.NDArray[np.bool_], dict[int, str]]:
     """Return which constants the recordings tell, and of the others why not.
@@ -55,11 +55,11 @@ def told_apart(
     errors, slopes = sensitivities(residuals, free_constants, z)
     # Residuals larger than noise make constants less certain than noise alone would.
     size = max(float(np.sqrt(np.mean(errors**2))), 1.0)
-    told, reasons = np.zeros(len(z), bool), dict(pressed)
+    identified, reasons = np.zeros(len(z), bool), dict(pressed)
     for k, constant in enumerate(free_constants.constants):
         if k in pressed:
             continue
-        column, taken = slopes[:, k], slopes[:, told]
+        column, taken = slopes[:, k], slopes[:, identified]
         whole = float(np.linalg.norm(column))
         if whole < 1e-6:
             reasons[k] = BLIND
@@ -68,19 +68,19 @@ def told_apart(
         own = float(np.linalg.norm(column - taken @ along)) if taken.size else whole
         if own < LEAST_SINE * whole:
             reasons[k] = (
-                f"it does what {_named(free_constants, told, along * np.linalg.norm(taken, axis=0))} does"
+                f"it does what {_named(free_constants, identified, along * np.linalg.norm(taken, axis=0))} does"
             )
         elif 2.0 * size / own > WIDEST_STEPS:
             reasons[k] = (
                 f"known only to ± {2.0 * size / own * constant.step:.2g} {constant.unit}".removesuffix(" -")
             )
         else:
-            told[k] = True
-    return told, reasons
+            identified[k] = True
+    return identified, reasons
 
 
-def _named(free_constants: FreeConstants, told: npt.NDArray[np.bool_], shares: Array) -> str:
+def _named(free_constants: FreeConstants, identified: npt.NDArray[np.bool_], shares: Array) -> str:
     """Name the constants that carry at least a tenth of the largest share."""
-    names = [c.words for c, taken in zip(free_constants.constants, told, strict=True) if taken]
+    names = [c.words for c, taken in zip(free_constants.constants, identified, strict=True) if taken]
     large = np.abs(shares) >= 0.1 * np.abs(shares).max()
     return " with ".join(name for name, is_large in zip(names, large, strict=True) if is_large)

@@ -198,7 +198,7 @@ def _wheel_angles(recording: Recording) -> Array:
 
 
 def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
-    """Scan the floor where the robot has been, on a grid a patch can not slip through; then sizes and grips there."""
+    """Scan the floor where the robot has been, on a grid a patch cannot slip through; then sizes and grips there."""
     tried = [_patch(x, y, PATCH_RADII_M[0]) for x, y in _cells(recordings)]
     best = [tried[k] for k in np.argsort(cost_of_each(errors, tried), kind="stable")[:BEST_CELLS]]
     half = 0.5 * PATCH_PITCH_M

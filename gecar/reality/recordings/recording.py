@@ -136,7 +136,7 @@ def read_case(folder: Path | str) -> Case:
     Raises
     ------
     InputError
-        If there is none, if one can not be read, or if they are of different robots.
+        If there is none, if one cannot be read, or if they are of different robots.
     """
     folder = Path(folder)
     if not folder.is_dir():

@@ -1,4 +1,4 @@
-"""What a recording's CSV can not say: robot, course, rig, cap, program, noise. From the TOML beside it."""
+"""What a recording's CSV cannot say: robot, course, rig, cap, program, noise. From the TOML beside it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Setup:
     notes: str = ""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel to another process, as a mapping proxy can not."""
+        """Travel to another process, as a mapping proxy cannot."""
         return _arrived, ({**vars(self), "noise": dict(self.noise)},)
 
 

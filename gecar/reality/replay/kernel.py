@@ -6,7 +6,7 @@ adds them up, wheel angles and pose, drifts for ever once it is wrong, so it is 
 wheel angles with a fixed memory, the pose by a Kalman filter on (x, y, heading), whose normalised innovations are
 the whitened residual. With an endless memory the replay is open loop from start to end.
 
-Robots that are told and seen at the same times are replayed in lock step (`gecar.world.kernel.lock_step`).
+Robots with the same timing of commands and poses are replayed in lock step (`gecar.world.kernel.lock_step`).
 
 Source: prediction-error identification, Ljung, System Identification (2nd ed.), ch. 7.
 """

@@ -1,4 +1,4 @@
-"""What these recordings can not tell apart: effects that do as well in each other's place."""
+"""What these recordings cannot tell apart: effects that do as well in each other's place."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def left_out_gains(estimator: Estimator, step: Step) -> Array:
     """Return what a step gains on each fold when that is left out, shape (folds,)."""
     new, folds = step.model, estimator.blocks.folds
     gained = np.bincount(folds, costs(step.base.errors) - costs(new.errors))
-    # What one recording alone shows can not be left out. Wholly explained it counts: an imitation leaves something.
+    # What one recording alone shows cannot be left out. Wholly explained it counts: an imitation leaves something.
     alone = gained.max() > ONE_FOLD * step.gain and step.energy_after < NEGLIGIBLE * step.energy_before
     if alone or len(np.unique(folds)) < 2:
         return np.array([step.gain])

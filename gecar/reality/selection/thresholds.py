@@ -91,7 +91,7 @@ PRICE = Threshold(
     "prior odds of 1 in 30 effects (3.4), and of a size between one and a hundred names (4.6), rounded up",
 )
 
-# -- What can not be told apart
+# -- Alternatives that the recordings cannot separate
 CLOSE = Threshold(
     0.3, "share of an effect's gain that an alternative may lose, and no more than `PRICE`", "hand"
 )

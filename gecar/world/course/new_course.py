@@ -74,7 +74,7 @@ def new_course(path: Path, columns: int = 8, rows: int = 4, tile_size_m: float =
     Raises
     ------
     InputError
-        If the file exists or can not be written, or the course would be too small or too large.
+        If the file exists or cannot be written, or the course would be too small or too large.
     """
     if path.suffix != ".toml":
         raise expected(path, f"a name ending in '{path.suffix}'", "a course file's name, ending in .toml")

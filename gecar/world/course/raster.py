@@ -19,7 +19,7 @@ from gecar.errors import InputError, expected
 PITCH_M = 0.001
 MAX_CELLS = 50_000_000  # 50 m^2 at 1 mm, 50 MB
 WHITE = 255
-# Half covered cells are common (an edge in the middle of a cell); nudged, rounding can not split such ties.
+# Half covered cells are common (an edge in the middle of a cell); nudged, rounding cannot split such ties.
 _NUDGE = 1e-6
 
 
@@ -163,7 +163,7 @@ def read_image(path: Path, where: str) -> npt.NDArray[np.uint8]:
         raise expected(where, f"no file {path}", "a picture of the course") from None
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise expected(
-            where, f"{path.name}, which can not be read ({error})", "a PNG, JPEG or TIFF file"
+            where, f"{path.name}, which cannot be read ({error})", "a PNG, JPEG or TIFF file"
         ) from None
     return np.ascontiguousarray(np.asarray(sheet.convert("L"))[::-1])
 

@@ -1,7 +1,7 @@
 """Reference times: the fastest drives an optimiser found, for the robot and the courses that come with gecar.
 
 `python -m benchmarks.reference_times` searches for them and writes the table. A reference drive needs no sensor and
-no program: it is what the robot can do on a course, where the lower bound is what it can not, as far as its tyres hold.
+no program: it is what the robot can do on a course, where the lower bound is what it cannot, as far as its tyres hold.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Sine, cosine and exponential by series: no library call in a kernel's inner loop, and the same bits everywhere.
 
-Compilers can run such functions for several lanes at once, which they can not do with a call.
+Compilers can run such functions for several lanes at once, which they cannot do with a call.
 """
 
 from __future__ import annotations

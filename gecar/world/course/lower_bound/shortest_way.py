@@ -68,7 +68,7 @@ def shortest_way(layout: Layout, start: int, sequence: Sequence[int], x_m: float
 
 
 def _with_tiles_between(layout: Layout, start: int, sequence: Sequence[int]) -> list[int]:
-    """Return the driving order with every tile put in that can not be avoided."""
+    """Return the driving order with every tile put in that cannot be avoided."""
     chain = [start]
     for after in sequence:
         if after in layout.drivable_neighbours(chain[-1]):
