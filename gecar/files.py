@@ -79,7 +79,7 @@ def json_lines(table: Mapping[str, Any]) -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Say whether there is such a file; names that no file can have (too long, a null in it) are none."""
+    """Return whether a file exists; False for names that no file can have (too long, a null in it)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -87,7 +87,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Say whether there is such a folder, as `is_file`."""
+    """Return whether a folder exists, as `is_file`."""
     try:
         return path.is_dir()
     except (OSError, ValueError):

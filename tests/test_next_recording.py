@@ -45,7 +45,7 @@ def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
     differences = parted(LIKE)
     best = max(differences, key=lambda name: differences[name])
     assert differences[best] > 100.0
-    assert suggested.why.startswith(f"{best}: tells sensor_delay from sensor_lag")
+    assert suggested.why.startswith(f"{best}: distinguishes sensor_delay from sensor_lag")
     assert suggested.commands == LIBRARY[best]
 
 

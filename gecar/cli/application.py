@@ -71,29 +71,25 @@ def reflowed(text: str) -> str:
 
 
 COMMANDS = (
-    CommandEntry("evolve", EVOLVE, "Evolve a program that brings the robot round a course.", "evolve:evolve"),
-    CommandEntry(
-        "simulate", EVOLVE, "Drive a program in the simulation; draw or film the drive.", "simulate:simulate"
-    ),
-    CommandEntry(
-        "plot", EVOLVE, "Draw a run's pictures again, or several runs beside each other.", "plot:plot"
-    ),
+    CommandEntry("evolve", EVOLVE, "Evolve a program that drives the robot round a course.", "evolve:evolve"),
+    CommandEntry("simulate", EVOLVE, "Simulate a program's drive; draw or film it.", "simulate:simulate"),
+    CommandEntry("plot", EVOLVE, "Redraw a run's pictures, or compare several runs.", "plot:plot"),
     CommandEntry(
         "table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"
     ),
-    CommandEntry("check", EVOLVE, "Compare a table of fitness figures with a fresh run.", "check:check"),
+    CommandEntry("check", EVOLVE, "Rerun a table of fitness figures and report changes.", "check:check"),
     CommandEntry("course", COURSES, "List, show, print and make courses.", "course:course"),
     CommandEntry("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
     CommandEntry("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     CommandEntry("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
     CommandEntry("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
-    CommandEntry("motor", ROBOT, "Draw the motor's speed against input and power: Figs 7, 8.", "motor:motor"),
+    CommandEntry("motor", ROBOT, "Draw motor speed over speed and duty commands: Figs 7, 8.", "motor:motor"),
     CommandEntry(
-        "compare", ROBOT, "Set simulation beside recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"
+        "compare", ROBOT, "Compare simulation and recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"
     ),
     CommandEntry("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
-    CommandEntry("discover", ROBOT, "Find which physics the simulation left out.", "discover:discover"),
-    CommandEntry("effects", ROBOT, "List the physics a simulation may have left out.", "effects:effects"),
+    CommandEntry("discover", ROBOT, "Find the physics missing in the simulation.", "discover:discover"),
+    CommandEntry("effects", ROBOT, "List the effects that discover can find.", "effects:effects"),
 )
 
 

@@ -1,4 +1,4 @@
-"""Sizes in units people know, and from what size on something is material."""
+"""Sizes in millimetres and degrees, and the size from which something is material."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ DRIVE = 4.0  # a drive of 12 s is about 4 m
 class Material:
     """From what size on something is material.
 
-    A robot whose constants are known to half a percent is 5 mm off after a metre, and nobody tells that from wear.
-    So the default is 5 mm over a metre; or 1 degree, which is as far again 0.3 m later; or 2.5 % of a reading.
+    A robot whose constants are known to half a percent is 5 mm off after a metre, no more than wear makes. So the
+    default is 5 mm over a metre; or 1 degree, which is as far again 0.3 m later; or 2.5 % of a reading.
 
     Attributes
     ----------

@@ -10,7 +10,7 @@ from gecar.reality.verdict import Misfit
 
 
 def calibration_lines(result: Calibration) -> list[str]:
-    """Say what was fitted, what the recordings do not tell, and how well the robot does on recordings held out."""
+    """Say what was fitted, what the recordings cannot determine, and the misfit on recordings set aside."""
     lines = [fitted_line(fitted) for fitted in result.fitted]
     lines += [
         f"{u.constant.name} stays {_number(u.nominal, u.constant.unit)}: {u.why}."
@@ -22,21 +22,23 @@ def calibration_lines(result: Calibration) -> list[str]:
         lines.append(f"Not identifiable, {BLIND.replace(' it', ' them')}: {blind}.")
     if result.channels:
         where = (
-            "the part held out" if result.by_time else f"the recordings held out ({', '.join(result.held)})"
+            "the part set aside" if result.by_time else f"the recordings set aside ({', '.join(result.held)})"
         )
         lines.append(f"NRMSE on {where}, before and after: {channels_words(result)}.")
     if result.worse:
-        lines.append(f"These constants do worse there in {', '.join(result.worse)}: do not use them unseen.")
+        lines.append(
+            f"There the new constants are worse in {', '.join(result.worse)}: check them before use."
+        )
     if result.unexplained:
         lines.append(
-            f"They do not explain the misfit in {', '.join(result.unexplained)}: physics is missing that no constant "
-            "of this robot has. `gecar discover` looks for it."
+            f"Constants do not explain the misfit in {', '.join(result.unexplained)}: physics is missing that "
+            "the robot's constants do not describe. `gecar discover` looks for it."
         )
     return lines
 
 
 def fitted_line(fitted: FittedConstant) -> str:
-    """Say what a constant was and is, with its 95 % interval."""
+    """Return a constant's old and new value, with the 95 % interval."""
     unit = fitted.constant.unit
     interval = f"{fitted.rounded(fitted.low)} to {fitted.rounded(fitted.high)}"
     return (
@@ -46,7 +48,7 @@ def fitted_line(fitted: FittedConstant) -> str:
 
 
 def channels_words(result: Calibration) -> str:
-    """Return the misfits on what was held out, column by column."""
+    """Return the misfits on what was set aside, column by column."""
     return ", ".join(f"{name} {m.before:.4f} -> {m.after:.4f}" for name, m in result.channels.items())
 
 

@@ -49,7 +49,7 @@ def _steps_of(times: Mapping[str, float | None]) -> str:
 
 
 def standing_of(world: World, drive: Drive) -> str:
-    """Say how far a drive came, and how its time stands beside the lower bound and the paper's best."""
+    """Say how far a drive came, and compare its time with the lower bound and the paper's best."""
     bound = world.course.lower_bound_s(world.robot)
     words = f"{drive.checkpoints} of {len(world.course.sequence) - 1} checkpoints; "
     words += f"lower bound {bound:.2f} s{_above(drive, bound)}"

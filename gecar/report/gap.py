@@ -16,7 +16,7 @@ from gecar.world.rollout import Outcome
 
 
 def gap_lines(found: Gap) -> list[str]:
-    """Say in sentences how the simulation stands beside the recordings."""
+    """Compare the simulation with the recordings, in sentences."""
     count = len(found.trials)
     lines = [_simulated(found)]
     arrived = [t for t in found.trials if t.arrived]
@@ -33,7 +33,7 @@ def gap_lines(found: Gap) -> list[str]:
     reckoned = [t.name for t in found.trials if t.by_odometry]
     if reckoned:
         lines.append(
-            f"No pose was recorded in {', '.join(reckoned)}: its path is reckoned from the wheels' angles."
+            f"No pose was recorded in {', '.join(reckoned)}: its path is computed from the wheels' angles (odometry)."
         )
     lines.append(
         f"Displacement: {_displacement(found.trials)}; correlation x {_pair(found, 0)}, y {_pair(found, 1)}."
@@ -43,9 +43,9 @@ def gap_lines(found: Gap) -> list[str]:
 
 def _simulated(found: Gap) -> str:
     if found.outcome is None or found.simulated_s is None:
-        return "No program: the recorded commands, replayed open loop, stand for the simulation."
+        return "No program: simulation means the recorded commands, replayed open loop."
     if found.outcome == Outcome.GOAL:
-        return f"Arrival time at simulation: {with_share(found.simulated_s, found.share)}."
+        return f"Simulated arrival time: {with_share(found.simulated_s, found.share)}."
     return f"In simulation the robot {found.outcome.sentence} after {with_share(found.simulated_s, found.share)}."
 
 
@@ -60,7 +60,7 @@ def gap_title(found: Gap) -> str:
         )
     if errors:
         return f"{where}: the real robot arrives {abs(np.mean(errors)):.1f} % {_late(float(np.mean(errors)))}"
-    return f"{where}: {'commands replayed' if found.outcome is None else 'simulation'} beside recordings"
+    return f"{where}: {'commands replayed' if found.outcome is None else 'simulation'} and recordings"
 
 
 def _late(error_pct: float) -> str:
@@ -81,8 +81,8 @@ def gap_detail(found: Gap) -> str:
 
 def _frame(found: Gap) -> str:
     if found.outcome is None:
-        return "replays start where that fits best"
-    return "positions in the course's frame" if found.in_course else "all paths moved to one start"
+        return "start poses of replays fitted"
+    return "positions in the course's frame" if found.in_course else "paths aligned at the start"
 
 
 def _displacement(trials: Sequence[Trial]) -> str:

@@ -1,4 +1,4 @@
-"""A motor's speeds in words: a table beside the recordings of real ones."""
+"""A table of a simulated motor's speeds and of real ones."""
 
 from __future__ import annotations
 

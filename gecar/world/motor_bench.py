@@ -1,4 +1,4 @@
-"""How fast a motor on a bench turns in the end: at a share of the supply, or at a regulated speed."""
+"""Steady-state speed of a motor on a bench, under duty commands or speed commands."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ Floats = npt.NDArray[np.float64]
 
 
 def altered(robot: Robot, mode: str, duty_cap: float | None = None) -> Robot:
-    """Return the robot with another ``drive.mode``, and maybe another cap on commands [0..1]."""
+    """Return the robot with another ``drive.mode``, and optionally another cap on commands [0..1]."""
     drive = robot.drive.model_copy(update={"mode": mode, "duty_cap": duty_cap or robot.drive.duty_cap})
     return robot.model_copy(update={"drive": drive})
 
 
 def settled_speeds(robot: Robot, levels_pct: Sequence[float]) -> Floats:
-    """Return the left motor's speed at each level, held one after the other.
+    """Return the left motor's steady-state speed at each level, held one after the other.
 
     Parameters
     ----------
     robot
-        Whose motors; its ``drive`` says what a level is (of ``duty``: a share of the supply; of ``speed``: 10 deg/s
-        per percent of a regulator's set-point), and how far commands go.
+        Its ``drive`` gives the meaning of a level (``duty``: share of the supply; ``speed``: set-point of 10 deg/s per
+        percent) and the cap.
     levels_pct
         Commands before the cap [%].
 

@@ -29,7 +29,7 @@ def build_engine(
     space.iterations = 20
     space.collision_slop = 0.0005
     space.collision_bias = 0.2**60
-    space.sleep_time_threshold = 0.1  # obstacles that stand still cost nothing
+    space.sleep_time_threshold = 0.1  # resting obstacles sleep, and cost nothing
     body = _robot_body(robot)
     body.angle = heading
     body.position = pymunk.Vec2d(x, y) + pymunk.Vec2d(robot.physics["com_ahead"][0], 0.0).rotated(heading)

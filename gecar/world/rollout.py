@@ -1,4 +1,4 @@
-"""Drive a program over a course: from opcodes to an outcome, and to a trace where one is wanted."""
+"""Drive a program over a course: from opcodes to an outcome and, on request, a trace."""
 
 from __future__ import annotations
 
@@ -80,12 +80,12 @@ class Noise:
 
 @dataclass(frozen=True)
 class World:
-    """A robot on a course, and how finely it is simulated.
+    """A robot on a course, and the settings of its simulation.
 
     Attributes
     ----------
     robot, course
-        Who drives, and where.
+        The robot, and the course it drives on.
     step_s
         Step [s]; kernels hold 0.1 to 10 ms.
     time_limit_s
@@ -146,14 +146,14 @@ class World:
 
     @property
     def nominal(self) -> Conditions:
-        """The conditions this world says, one row."""
+        """The conditions of this world, one row."""
         noise = self.noise.sensor_pct, self.noise.motor_share
         return conditions(self.robot.physics, self.step_s, self.start, self.time_limit_s, 0.0, *noise)
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What came of a program.
+    """The result of a program's drive.
 
     Attributes
     ----------
@@ -252,7 +252,7 @@ class Driver:
         )
 
     def reset(self) -> None:
-        """Put everything that can be touched back where the course has it."""
+        """Reset robot and obstacles to where the course has them."""
         if self.world.uses_pymunk:
             x, y, heading = self.setup.start
             self._engine, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)

@@ -1,4 +1,4 @@
-"""A robot somebody else controls: commands in, sensor readings out, millisecond by millisecond."""
+"""A simulated robot under external control: commands in, sensor readings out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gecar.world.rollout import Driver, World
 
 
 class SteppedRobot:
-    """The simulated robot on its course, for controllers that are no program of ours.
+    """The simulated robot on its course, for controllers that are not programs of gecar.
 
     Parameters
     ----------

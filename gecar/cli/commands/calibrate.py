@@ -32,9 +32,9 @@ def calibrate(
     picture: Annotated[bool, typer.Option("--picture/--no-picture", help="Draw calibration.png.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Fit the robot's own constants, with 95 % intervals, and say which the recordings do not tell.
+    """Fit the robot's constants, with 95 % intervals; name those the recordings cannot determine.
 
-    What it writes is a robot file that every command takes.
+    The result is a robot file, for use with every command.
 
     [bold]Examples[/]
 

@@ -1,4 +1,4 @@
-"""``gecar compare``: simulation beside recordings, as the paper's Tables 6 and 7, Figs 9 and 10."""
+"""``gecar compare``: simulation and recordings compared, as in the paper's Tables 6 and 7, Figs 9 and 10."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def compare(
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Set simulation beside recordings: arrival times, paths, displacement, correlation, misfit of each channel.
+    """Compare simulation and recordings: arrival times, paths, displacement, correlation, misfit of each channel.
 
     [bold]Examples[/]
 
@@ -100,7 +100,7 @@ def _read(places: list[Path]) -> list[Recording]:
 
 
 def _program(place: Path | None, trials: list[Recording]) -> Program | None:
-    """Return the program asked for, or the one that all recordings name, or None."""
+    """Return the program given, or the one that all recordings name, or None."""
     from gecar.cli.inputs import find_program
     from gecar.language.program import parse_program, read_program
 

@@ -102,7 +102,7 @@ def evolve(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Evolve a program that brings the robot round a course.
+    """Evolve a program that drives the robot round a course.
 
     [bold]Examples[/]
 

@@ -1,4 +1,4 @@
-"""``gecar motor``: the motor's speed against speed input and power, the paper's Figs 7 and 8."""
+"""``gecar motor``: the motor's speed under speed and duty commands, the paper's Figs 7 and 8."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def motor(
     ] = Path("motor.png"),
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Draw the motor's speed against speed input and against power: the paper's Figs 7 and 8.
+    """Draw the motor's speed under speed commands and duty commands: the paper's Figs 7 and 8.
 
     [bold]Examples[/]
 

@@ -1,4 +1,4 @@
-"""``gecar plot``: a run's pictures again, what its evolution was like, or runs beside each other."""
+"""``gecar plot``: a run's pictures, a film of its evolution, or a comparison of runs."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def plot(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a run's pictures, or several runs beside each other.
+    """Draw a run's pictures, or compare several runs.
 
-    Of one run: convergence, the best program's drive, its derivation, and its genealogy. Runs that differ in their
-    seed only are drawn together, as median and middle half.
+    One run: convergence, and the best program's drive, derivation and genealogy. Runs that differ only in their seed
+    are drawn as one: median and interquartile range.
 
     [bold]Examples[/]
 
@@ -64,7 +64,7 @@ def plot(
 
 
 def _compare(output: Output, runs: list[Path], out: Path, of_one: dict[str, Any]) -> None:
-    """Draw runs beside each other."""
+    """Compare runs in one picture."""
     from gecar.cli.actions.run_pictures import compare
 
     for option, given in of_one.items():

@@ -1,1 +1,1 @@
-"""Pictures of simulation beside recordings: verdicts, gaps, calibrations, signatures, motors."""
+"""Pictures of simulation and recordings: verdicts, gaps, calibrations, signatures, motors."""

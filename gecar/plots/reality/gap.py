@@ -38,7 +38,7 @@ MAP_IN = 7.4
 
 
 def gap_figure(found: Gap, title: str = "", detail: str = "") -> Figure:
-    """Draw trials beside their simulation.
+    """Draw trials and their simulation.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _displacements(axes: Axes, found: Gap) -> None:
 
 
 def _times(axes: Axes, found: Gap) -> None:
-    """Draw arrival times beside the simulation's, Table 6 as a picture."""
+    """Draw arrival times and the simulation's, Table 6 as a picture."""
     axes.set_title("Arrival time [s]")
     names = [trial.name for trial in found.trials]
     for row, (trial, style) in enumerate(zip(found.trials, _styles(found.trials), strict=True)):

@@ -1,4 +1,4 @@
-"""The genealogy of a run's best program: whom in the population it descends from, and what changed it on the way."""
+"""The genealogy of a run's best program: its ancestors in the population, and the operators that changed it."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def fitness_words(merit: float, share: float | None) -> str:
 
 
 def _operators(lineage: Lineage, member: Member, share: Share) -> str:
-    """Say what changed an individual's program, and whom it was crossed with."""
+    """Return what changed an individual's program, and its crossover partner."""
     parents, changed = lineage.parents(member), lineage.changed(member)
     if not parents:
         return "first population" if member[0] == 0 else "new"

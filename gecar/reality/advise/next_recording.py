@@ -1,4 +1,4 @@
-"""The recording to make next: from a library of command sequences a robot can drive, the one that tells most.
+"""The recording to make next: from a library of command sequences a robot can drive, the most informative one.
 
 Each is driven by the robot as found and by its rival, the robot with the confused effect exchanged or with a parameter
 at the end of its interval; chosen is the sequence in which their sensors differ most, in standard deviations.
@@ -81,18 +81,18 @@ def suggest(
         others = " and ".join(confused.alternatives)
         name, apart = _telling(robot, rivals[0], like, noise)
         if apart < LEAST_DIFFERENCE:
-            words = f"{name}: no sequence of the library tells {confused.id} from {others} with these sensors"
+            words = f"{name}: no sequence of the library distinguishes {confused.id} from {others} with these sensors"
             return NextRecording(words, LIBRARY[name])
-        return NextRecording(f"{name}: tells {confused.id} from {others}", LIBRARY[name])
+        return NextRecording(f"{name}: distinguishes {confused.id} from {others}", LIBRARY[name])
     if unexplained:
         name = "long and slow, then long and fast"
         return NextRecording(
-            f"{name}: shows whether what is left depends on speed, way or time", LIBRARY[name]
+            f"{name}: shows whether the residual depends on speed, distance or time", LIBRARY[name]
         )
     if found:
         name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
         return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
-    words = "reversals: nothing is missing so far; this asks most of gears, friction and grip"
+    words = "reversals: nothing is missing so far; this stresses gears, friction and grip most"
     return NextRecording(words, LIBRARY["reversals"])
 
 

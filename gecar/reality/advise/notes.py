@@ -1,4 +1,4 @@
-"""Notes beside a verdict: nuisances that were fitted, assumptions, and what could not be looked for."""
+"""Notes on a verdict: nuisances that were fitted, assumptions, and what could not be tested."""
 
 from __future__ import annotations
 
@@ -27,20 +27,22 @@ def notes_on(
     doubted
         Whether a misfit of readings points to the measured path, rather than to the sensor.
     candidates
-        Effects that proved themselves where they were fitted, and were not confirmed.
+        Effects accepted on the recordings fitted on, and not confirmed by those set aside.
     """
     notes = [
-        f"{effect} explains recordings it was fitted to, but those set aside do not ask for it, or its interval holds "
-        "its neutral value: a candidate, no finding."
+        f"{effect} explains the recordings it was fitted to, but is not confirmed by those set aside, or its interval "
+        "contains its neutral value: a candidate, not a finding."
         for effect in candidates
     ]
     if split.by_time:
         notes.append(
-            "Only one recording: its last part was set aside, so it is judged on later times, not on another run."
+            "Only one recording: its last part was set aside, so validation uses later times of the same run."
         )
     if clocks_fitted:
         late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
-        notes.append(f"The camera's clock was late by {late} ms in the recordings: taken out, no effect.")
+        notes.append(
+            f"The camera's clock was late by {late} ms in the recordings: corrected, and no effect of the robot."
+        )
     if doubted:
         notes.append(
             "Readings are right on even floor and wrong near lines, and neither the sensor nor the line explains it: "
@@ -48,11 +50,11 @@ def notes_on(
         )
     measured = {name for r in split.fitted for name in r.measured}
     if not {"x_m", "heading_rad"} & measured:
-        notes.append("No pose was recorded: what only a camera sees was not looked for.")
+        notes.append("No pose was recorded: effects that only a camera shows were not tested.")
     located = [_start(run) for run in fitted.recordings if run.nuisances.start is not None]
     if located:
         notes.append(
-            f"Where no camera looked, readings tell the start, up to places that look the same: {'; '.join(located)}."
+            f"Start poses found from sensor readings, up to places that look the same: {'; '.join(located)}."
         )
     return tuple(notes)
 

@@ -1,1 +1,1 @@
-"""A program's simulation beside recordings of it."""
+"""A program's simulation compared with recordings of it."""

@@ -1,10 +1,10 @@
-"""The gap: one program's drive in simulation beside recordings of it, in the paper's figures.
+"""The gap: one program's simulated drive compared with recordings of it, in the paper's figures.
 
 found = gap([read_recording("trial_1.csv"), ...], world, program)
 
 Table 6 (arrival times), Fig. 9 (paths), Fig. 10 (displacement over time), Table 7 (correlation of coordinates), and
 per channel the root mean square error in standard deviations of what was measured (NRMSE): of the closed loop, and of
-the recorded commands replayed open loop. Without a program the replay stands for the simulation.
+the recorded commands replayed open loop. Without a program the replay serves as the simulation.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Path:
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording beside the simulation.
+    """One recording compared with the simulation.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Gap:
-    """Trials beside a simulation.
+    """Trials compared with a simulation.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ def gap(
     program: Program | None = None,
     in_course: bool = False,
 ) -> Gap:
-    """Set a program's simulation beside recordings of it.
+    """Compare a program's simulation with recordings of it.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def gap(
     robot, course
         Of the simulation; a program needs a course.
     program
-        What drove; None: the recorded commands, replayed open loop, stand for the simulation.
+        The program that drove; None: the recorded commands are replayed open loop.
     in_course
         Whether to compare positions in the course's frame, instead of from a common start.
     """

@@ -1,6 +1,6 @@
 """Model discrepancy: what a simulation is off by even where nothing worth a name is missing.
 
-No robot is its file: its constants are off a little, and there is always some small physics that nobody listed. Both
+No robot equals its file: its constants are slightly off, and there is always small physics in no catalogue. Both
 are part of the noise here, so that an effect is named only where it stands out of them.
 
 *Small changes.* Every parameter of the catalogue may be off by a small normal number, in sizes worth a name. Integrated

@@ -1,4 +1,4 @@
-"""Hotspots: excess energy at one place on the floor, too little to count beside all that was driven elsewhere."""
+"""Hotspots: excess energy at one place on the floor, too little to count over a whole recording."""
 
 from __future__ import annotations
 

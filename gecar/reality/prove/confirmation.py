@@ -1,4 +1,4 @@
-"""Whether the recordings set aside ask for each effect, beside the others refitted without it."""
+"""Whether the recordings set aside confirm each effect, against the others refitted without it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class KernelInput(NamedTuple):
     memory
         Over which wheel angles are re-based [s]; inf: never, and neither is the pose.
     bench
-        Whether the wheels hang in the air.
+        Whether the wheels are in the air.
     """
 
     t: Array

@@ -36,7 +36,7 @@ class Residuals:
     Attributes
     ----------
     recordings
-        Each beside its simulation.
+        Each with its simulation.
     sensor
         Whether they are the colour sensor's.
     threads

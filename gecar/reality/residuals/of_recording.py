@@ -40,7 +40,7 @@ FEWEST_POSES = 4  # that make a path
 
 @dataclass(frozen=True)
 class RecordingResiduals:
-    """One recording beside its simulation; make it with `residuals_of`.
+    """A recording with its simulation; make it with `residuals_of`.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class RecordingResiduals:
 def residuals_of(
     recording: Recording, noise: Noise, memory_s: float, course: Course | None
 ) -> RecordingResiduals:
-    """Set a recording beside its simulation.
+    """Put a recording and its simulation together.
 
     Parameters
     ----------
