@@ -52,7 +52,7 @@ def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
 def test_where_no_sequence_tells_two_robots_apart_that_is_said() -> None:
     found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
     suggested = suggest(LATE, found, [LAGGING], seen_on("none"), NOISE, unexplained=False)
-    assert "no sequence of the library tells" in suggested.why
+    assert "no sequence of the library distinguishes" in suggested.why
 
 
 @pytest.mark.parametrize(("effect", "value"), [("backlash", 5.0), ("actuation_delay", 0.03)])
