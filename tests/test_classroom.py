@@ -3,10 +3,9 @@
 import html
 import json
 import re
-import shutil
-import subprocess
 
 import pytest
+from browser import PRESSES, in_chromium, opened
 from PIL import Image
 from trials import ARRIVES
 
@@ -17,21 +16,7 @@ from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-in_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
-FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
-         "--disable-background-networking", "--disable-component-update", "--hide-scrollbars",
-         "--window-size=1280,1060"]  # fmt: skip
 WORLD, PROGRAM = World(load_robot("ev3"), load_course("paper"), time_limit_s=4.0), parse_program(ARRIVES)
-# Pressed one after the other on the open page; what it shows then stands in its title.
-PRESSES = """<script>
-const said = [], note = () => said.push(document.body.dataset.time + document.body.dataset.playing[0]);
-for (const [key, shift] of %s) {
-  document.body.dispatchEvent(new KeyboardEvent("keydown", { key, shiftKey: shift, bubbles: true }));
-  note();
-}
-document.title = said.join(" ");
-</script></body>"""
 
 
 @pytest.fixture(scope="module")
@@ -44,16 +29,6 @@ def page(drive, tmp_path_factory):
     return write_classroom_page(
         WORLD, PROGRAM, drive, tmp_path_factory.mktemp("page") / "drive.html", "A <drive>"
     )
-
-
-def opened(page, tmp_path, *words, after="", budget=600):
-    """Open a page in Chromium; return what it printed."""
-    command = [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path / 'profile'}", f"--virtual-time-budget={budget}"]
-    ended = subprocess.run(
-        [*command, *words, page.as_uri() + after], capture_output=True, text=True, timeout=60, check=False
-    )
-    assert ended.returncode == 0, ended.stderr
-    return ended.stdout
 
 
 def lit(dom):

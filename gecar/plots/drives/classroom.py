@@ -6,6 +6,7 @@ import base64
 import html
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from gecar.world.robot import Robot
 from gecar.world.rollout import Drive, World
 
 TEMPLATE = Path(__file__).with_suffix(".html")
+SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("floor.js", "play.js"))
 _PICTURE_PITCH_M = 0.002
 
 
@@ -51,19 +53,28 @@ def write_classroom_page(
     InputError
         If the drive holds no trace.
     """
-    page = read_text(TEMPLATE, "the page's template")
-    # A program's text must not be able to end the script it stands in.
-    played = json.dumps(drive_json(world, program, drive), separators=(",", ":"), allow_nan=False)
     words = {
         "@TITLE@": html.escape(title or world.course.title or world.course.name),
         "@DETAIL@": html.escape(detail),
         "@ALT@": html.escape(f"The robot's way round the course. {title}"),
-        "@DRIVE@": played.replace("<", "\\u003c"),
+        "@DRIVE@": script_json(drive_json(world, program, drive)),
     }
-    for place, text in words.items():
-        page = page.replace(place, text)
-    write_whole(path, page)
+    write_whole(path, filled(TEMPLATE, words))
     return path
+
+
+def filled(template: Path, words: Mapping[str, str]) -> str:
+    """Return a page's template with words in their places, and with the scripts that pages which play drives share."""
+    page = read_text(template, "the page's template")
+    scripts = {f"@{path.stem.upper()}@": read_text(path, "the page's script").rstrip() for path in SCRIPTS}
+    for place, text in (scripts | dict(words)).items():
+        page = page.replace(place, text)
+    return page
+
+
+def script_json(table: Any) -> str:
+    """Return JSON for inside a script, which no text in it can end."""
+    return json.dumps(table, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def drive_json(world: World, program: Program, drive: Drive) -> dict[str, Any]:
@@ -74,8 +85,8 @@ def drive_json(world: World, program: Program, drive: Drive) -> dict[str, Any]:
     t = trace["t_s"]
     tests = program.opcodes[program.opcodes[:, op.OP] == op.TEST]
     return {
-        "course": _course(world.course),
-        "robot": _robot(world.robot),
+        "course": course_json(world.course),
+        "robot": robot_json(world.robot),
         "lines": program.source.splitlines(),
         "colours": line_colours(trace),
         "thresholds": [float(c) / op.THRESHOLDS_PER_PCT for c in np.unique(tests[:, op.C])],
@@ -107,7 +118,8 @@ def _rounded(values: npt.NDArray[np.float64], places: int) -> list[float]:
     return (np.round(np.nan_to_num(values), places) + 0.0).tolist()  # no -0.0
 
 
-def _course(course: Course) -> dict[str, Any]:
+def course_json(course: Course) -> dict[str, Any]:
+    """Return what a page draws of a course [m]."""
     square = course.layout.square
     return {
         "width": course.width_m,
@@ -149,7 +161,8 @@ def _thing(obstacle: Obstacle) -> dict[str, Any]:
     return {"shape": _rings(centred.outline)[0], "pose": pose, "movable": obstacle.movable}
 
 
-def _robot(robot: Robot) -> dict[str, Any]:
+def robot_json(robot: Robot) -> dict[str, Any]:
+    """Return a robot's outlines about its axle's centre [m]."""
     shape = shape_of(robot)
     return {
         "body": shape.body.tolist(),
