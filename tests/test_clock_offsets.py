@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.fitting.clock_offsets import scattered, with_fitted_clocks
 from gecar.reality.noise.sensor_noise import estimate_noise

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from command import Command
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.recordings.recording import write_recording
 

@@ -7,21 +7,18 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
-import subprocess
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command import start
+from concealing import EV3, recorded, verdict_on
 
 from gecar import notebook
 from gecar.errors import InputError
 from gecar.plots.reality.verdict import verdict_figures
-from gecar.plots.style import picture
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.parameters import free
@@ -31,49 +28,15 @@ from gecar.reality.materiality import Size
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.prove.whiteness import whiteness
-from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, write_recording
-from gecar.reality.recordings.setup import Setup
+from gecar.reality.recordings.recording import Case, read_case, write_recording
 from gecar.reality.recordings.split import hold_out
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.residuals.of_recording import residuals_of
-from gecar.reality.verdict import Judgement, Misfit, Residual, Verdict
+from gecar.reality.verdict import Judgement, Misfit, Residual
 from gecar.report.verdict import sentences
-from gecar.report.verdict_page import verdict_page
 from gecar.world.effects import CATALOGUE
-from gecar.world.robot import Robot, load_robot
 
-EV3 = load_robot("ev3")
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
-
-
-def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor", most: int = 7) -> Recording:
-    """Held duties drawn by chance, encoders in whole degrees, a camera at 33 Hz with 1 mm and 0.3 degrees of noise."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(0.0, seconds, 0.01)
-    duty = np.repeat(rng.integers(-most, most + 1, (2, int(seconds / 0.8) + 1)) * 10, 80, axis=1)[
-        :, : len(t)
-    ].astype(float)
-    columns = {"t_s": t, "left_duty_pct": duty[0], "right_duty_pct": duty[1]}
-    setup = Setup(rig=rig, course="none", duty_cap=1.0)
-    rows = replayer_of(make_recording("made", columns, setup)).play(robot.physics, np.array([1.0, 0.5, 0.3]))[
-        0
-    ]
-    columns |= {
-        "left_angle_deg": np.round(np.degrees(rows[:, 0])),
-        "right_angle_deg": np.round(np.degrees(rows[:, 1])),
-    }
-    if rig == "floor":
-        frames = np.where(np.arange(len(t)) % 3 == 0, 0.0, np.nan)
-        columns["x_m"] = rows[:, 4] + rng.normal(0, 0.001, len(t)) + frames
-        columns["y_m"] = rows[:, 5] + rng.normal(0, 0.001, len(t)) + frames
-        columns["heading_deg"] = np.degrees(rows[:, 6]) + rng.normal(0, 0.3, len(t)) + frames
-    return make_recording(f"run_{seed}", columns, setup)
-
-
-@cache
-def verdict_on(effect: str = "", label: str = "", value: float = 0.0, rig: str = "floor") -> Verdict:
-    robot = EV3.with_effects({effect: {label: value}}) if effect else EV3
-    return discover(Case("made", tuple(recorded(robot, seed, rig=rig) for seed in range(5))))
 
 
 def test_nothing_concealed_is_nothing_found() -> None:
@@ -173,36 +136,10 @@ def test_the_words_name_effect_size_and_proof() -> None:
     assert "recordings not used for the fit" in words
 
 
-def test_pictures_and_page_are_whole() -> None:
+def test_all_pictures_are_drawn() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     figures = verdict_figures(verdict)
     assert set(figures) == {"gap", "where", "tried", "traces", "map"}
-    assert "commands act late" in verdict_page(verdict, {"gap": b"\x89PNG"})
-
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium: apt-get install chromium")
-def test_the_report_opens_in_a_browser_with_all_its_pictures(tmp_path: Path) -> None:
-    verdict = verdict_on("actuation_delay", "time_s", 0.03)
-    pictures = {name: picture(figure) for name, figure in verdict_figures(verdict).items()}
-    told = "<script>addEventListener('load', () => document.title = [...document.images].map(i => i.naturalWidth > 400"
-    page = tmp_path / "report.html"
-    page.write_text(verdict_page(verdict, pictures) + told + ").join())</script>", encoding="utf-8")
-    flags = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-sync",
-    ]
-    flags += ["--disable-background-networking", "--disable-component-update", "--dump-dom"]
-    command = [CHROMIUM, *flags, f"--user-data-dir={tmp_path / 'profile'}", page.as_uri()]
-    dom = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout  # type: ignore[arg-type]
-    assert f"<title>{','.join(['true'] * len(pictures))}</title>" in dom
-    assert "commands act late" in dom
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")

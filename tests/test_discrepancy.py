@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from concealing import recorded
 from linear_case import EV3, bumps, linear, linear_problem
-from test_discovery import recorded
 
 from gecar.cli.commands.discover import discover as command
 from gecar.errors import InputError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from test_discovery import EV3
+from concealing import EV3
 from test_location import seen_on_the_course
 
 from gecar.reality.noise.sensor_noise import estimate_noise

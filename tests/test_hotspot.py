@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.discovery import discover
 from gecar.reality.locate.hotspot import strongest_place

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded, verdict_on
+from concealing import EV3, recorded, verdict_on
 
 from gecar.reality.discovery import discover
 from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.advise.next_recording import LIBRARY, difference, suggest
 from gecar.reality.materiality import Size

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.recordings.recording import Recording

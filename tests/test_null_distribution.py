@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.residuals.of_case import motion_residuals

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_discovery import EV3, recorded
+from concealing import EV3, recorded
 from test_location import seen_on_the_course
 from trials import ARRIVES, trial
 
