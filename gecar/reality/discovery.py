@@ -168,7 +168,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             [step.effect for stage in stages for step in stage.candidates],
         ),
         evidence=Evidence(
-            motion.explained, sensing.explained if sensing else None, where, fitted, after.held, known
+            motion.explained,
+            sensing.explained if sensing else None,
+            where,
+            fitted,
+            after.held,
+            before.held,
+            known,
         ),
     )
 

@@ -22,6 +22,8 @@ class Evidence:
         Where simulation and reality part.
     fitted, held
         The recordings fitted on and set aside, beside their simulation, with their nuisances.
+    held_before
+        Those set aside with the nuisances of the robot as it was known.
     before
         The robot as it was known.
     """
@@ -31,6 +33,7 @@ class Evidence:
     where: MismatchMap
     fitted: Residuals
     held: Residuals
+    held_before: Residuals
     before: Robot
 
     def __str__(self) -> str:

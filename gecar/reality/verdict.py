@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,11 +15,24 @@ VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to sp
 
 @dataclass(frozen=True)
 class Misfit:
-    """NRMSE of a channel over the recordings set aside: RMSE over the standard deviation of what was measured."""
+    """NRMSE of a channel over the recordings set aside: RMSE over the standard deviation of what was measured.
+
+    Attributes
+    ----------
+    before, after, floor
+        Of the robot as it was, of the robot found, and of what noise alone leaves.
+    deviation
+        That standard deviation, in the column's unit: times it, each is an RMSE.
+    """
 
     before: float
     after: float
     floor: float
+    deviation: float = math.nan
+
+    def as_json(self) -> dict[str, float]:
+        """Return the three figures as they are written."""
+        return {"before": self.before, "after": self.after, "floor": self.floor}
 
 
 @dataclass(frozen=True)
@@ -150,6 +164,11 @@ class Judgement:
         gap = sum(m.before - m.floor for m in seen)
         return sum(m.before - m.after for m in seen) / gap if gap > 0.0 else None
 
+    @property
+    def failed(self) -> bool:
+        """Whether the robot found is further off than the robot as it was: the proof fails."""
+        return (self.gap_closed or 0.0) < 0.0
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -211,7 +230,7 @@ class Verdict:
             "located": [_place_json(place) for place in self.located],
             "holdout": {
                 "recordings": list(judged.recordings),
-                "channels": {c: vars(m) for c, m in judged.channels.items()},
+                "channels": {c: m.as_json() for c, m in judged.channels.items()},
                 "before": judged.before,
                 "after": judged.after,
                 "floor": judged.floor,
@@ -256,7 +275,7 @@ def _residual_json(residual: Residual) -> dict[str, Any]:
     table: dict[str, Any] = {"white": residual.white, "p": residual.p, "formula": residual.formula}
     table |= {"material": residual.material, "size": size_json(residual.size)}
     if residual.described is not None:
-        table["with_formula"] = {c: vars(m) for c, m in residual.described.items()}
+        table["with_formula"] = {c: m.as_json() for c, m in residual.described.items()}
     return table
 
 

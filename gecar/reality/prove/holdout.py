@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.noise.sensor_noise import PATH_CAUTION, Noise
 from gecar.reality.recordings.columns import COLUMNS
-from gecar.reality.replay.replayer import Replayer, replayer_of
+from gecar.reality.replay.replayer import Prediction, Replayer, replayer_of
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.verdict import Misfit
@@ -47,6 +48,13 @@ class Contender:
     correction: Correction | None = None
 
 
+class Replayed(NamedTuple):
+    """A recording's replayer, and what it predicts."""
+
+    replayer: Replayer
+    prediction: Prediction
+
+
 def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
     """Compare two robots on recordings neither was fitted to, whole and open loop, by column of the file.
 
@@ -60,7 +68,8 @@ def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
         if field in was and field in now:
             deviation = max(_rms(_deviations(before.held, field)), 1e-12)
             sizes = (_rms(was[field]), _rms(now[field]), float(floors[field]))
-            out[column] = Misfit(*(size / deviation for size in sizes))
+            was_off, is_off, noise = (size / deviation for size in sizes)
+            out[column] = Misfit(was_off, is_off, noise, deviation / COLUMNS[column][1])
     return out
 
 
@@ -81,10 +90,27 @@ def _deviations(held: Residuals, field: str) -> Array:
     return np.concatenate([v - np.nanmean(v) for v in values if not np.isnan(v).all()])
 
 
+def replayed(run: RecordingResiduals, physics: npt.NDArray[Any], start_s: float = np.inf) -> Replayed:
+    """Replay a recording whole and open loop, from the start that fits its poses best.
+
+    Parameters
+    ----------
+    run
+        The recording, with its clock as it was fitted.
+    physics
+        The robot, shape (1,).
+    start_s
+        Up to when poses tell the start [s]; without a pose by then, all of them do.
+    """
+    replayer = replayer_of(run.recording, run.noise.sd).with_clock(run.nuisances.clock_offset_s)
+    t = replayer.inputs.pose_t
+    within = start_s if len(t) and t[0] <= start_s else np.inf
+    return Replayed(replayer, replayer.play(physics, replayer.aligned_start(physics, within)))
+
+
 def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None) -> dict[str, Array]:
     recording, physics = run.recording, robot.physics
-    replayer = replayer_of(recording, run.noise.sd).with_clock(run.nuisances.clock_offset_s)
-    rows, _, poses, _ = replayer.play(physics, replayer.aligned_start(physics))
+    replayer, (rows, _, poses, _) = replayed(run, physics)
     if correction is not None:
         rows, poses = correction(replayer, rows, poses)
     out = {f: getattr(recording, f) - rows[:, k] for f, k in _ROW.items()}

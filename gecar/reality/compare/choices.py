@@ -1,0 +1,115 @@
+"""Why an effect was taken and not another: what each, fitted in its place, leaves on the recordings set aside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gecar.reality.compare.side_by_side import READING, Beside, beside, measure_of, root_mean, side_by_side
+from gecar.reality.fitting.initial_values import initial_values
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.optimisation.least_squares import cost_of_each
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.selection.problem import Problem
+from gecar.reality.verdict import Verdict
+
+MOST_RIVALS = 5
+LEAST_TAKEN = 0.05  # of what is off: a rival that takes less away needs no bar
+
+
+class Rival(NamedTuple):
+    """What an effect leaves in place of the one that was taken, in the choice's unit."""
+
+    effect: str
+    left: float
+    taken: bool
+
+
+class Choice(NamedTuple):
+    """One choice: its measure, what was off before, what each candidate leaves, the best first, and of how many."""
+
+    measure: str
+    before: float
+    rivals: tuple[Rival, ...]
+    tried: int
+
+    @property
+    def telling(self) -> list[Rival]:
+        """The one that was taken, and those that take a visible share away."""
+        return [r for r in self.rivals if r.taken or r.left < (1.0 - LEAST_TAKEN) * self.before]
+
+
+class Told(NamedTuple):
+    """What was replayed to tell a verdict: recordings beside their simulation, and what candidates leave."""
+
+    shown: tuple[Beside, ...]
+    choices: tuple[Choice, ...]
+
+
+def tell(verdict: Verdict) -> Told:
+    """Replay what a verdict's words and pictures show."""
+    return Told(side_by_side(verdict), choices(verdict))
+
+
+def choices(verdict: Verdict) -> tuple[Choice, ...]:
+    """Return what candidates leave on the recordings set aside, choice by choice, in the order they were taken.
+
+    Where nothing was taken and something is left, what the best candidates would leave.
+    """
+    evidence, out = verdict.evidence, list[Choice]()
+    of_motion = measure_of(replace(verdict, effects=(), located=()))
+    for explained, measure in ((evidence.motion, of_motion), (evidence.sensing, READING)):
+        if explained is None or not explained.tried:
+            continue
+        taken = [
+            (step, explained.tried[min(step.stage, len(explained.tried) - 1)]) for step in explained.steps
+        ]
+        if not taken and explained.unexplained:
+            taken = [(None, explained.tried[0])]
+        for step, tried in taken:
+            choice = _choice(explained.problem, evidence.held, measure, step, tried)
+            if choice.rivals:
+                out.append(choice)
+    return tuple(out)
+
+
+def _choice(
+    problem: Problem, held: Residuals, measure: str, step: Step | None, tried: tuple[Step, ...]
+) -> Choice:
+    """Return what an effect and its runners-up leave on top of what had been taken before."""
+    first = step or (tried[0] if tried else None)
+    base = first.base if first else problem.known
+    models = {other.effect: other.model for other in tried if set(base.effects) == set(other.base.effects)}
+    models |= {step.effect: step.model} if step else {}
+    missing = [e for e in problem.catalogue if e not in models and e not in base.effects]
+    models |= _fitted(problem, base, missing, MOST_RIVALS - len(models))
+    before = _left(held, base, measure)
+    rivals = [
+        Rival(effect, _left(held, model, measure), step is not None and effect == step.effect)
+        for effect, model in models.items()
+    ]
+    ordered = tuple(sorted(rivals, key=lambda rival: rival.left)[:MOST_RIVALS])
+    return Choice(measure, before, ordered, len(problem.catalogue) - len(base.effects))
+
+
+def _fitted(problem: Problem, base: Model, effects: list[str], count: int) -> dict[str, Model]:
+    """Return the most promising effects fitted on top of a model, with nothing taken for noise but the sensors'."""
+    estimator = problem.estimator.under(None)
+    estimator.sensitivities(base, effects)  # all at once, in lock step
+    gains = {effect: estimator.linear_gain(base, effect) for effect in effects}
+    found = {}
+    for effect in sorted(effects, key=lambda e: -gains[e])[: max(count, 0)]:
+        trial = estimator.trial(base, effect)
+        starts = initial_values(effect, estimator.robot, problem.recordings, trial)
+        if starts:
+            best = starts[int(np.argmin(cost_of_each(trial, starts)))]
+            found[effect] = estimator.fit((*base.effects, effect), {**base.values, effect: best})
+    return found
+
+
+def _left(held: Residuals, model: Model, measure: str) -> float:
+    """Return what a model is off by on recordings set aside, root mean square over them."""
+    shown = [beside(run, run, model.physics, model.physics, True) for run in held.recordings]
+    return root_mean(np.array([each.off(measure).after for each in shown if each.has(measure)]))
