@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from gecar.reality.materiality import Size
-from gecar.reality.verdict import Found, Interval, Limit, Misfit, Place, Verdict
+from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.verdict import VISIBLE, Found, Interval, Limit, Minor, Misfit, Place, Verdict
+from gecar.report.units import amount, quantities, smallest
 from gecar.world.effects import BY_ID
 
 CHANNEL_WORDS = {
@@ -13,6 +15,11 @@ CHANNEL_WORDS = {
     "heading": "heading", "battery": "the battery's voltage", "yaw_rate": "the turning rate",
     "reflection": "the colour sensor",
 }  # fmt: skip
+_CHANNELS = {column: column.rsplit("_", 1)[0] for column in COLUMNS}
+_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "deg"), "dps": (1.0, "deg/s"), "v": (1.0, "V"), "pct": (1.0, "%")}
+FAILS = "The proof fails: on recordings set aside, the simulation is further off with what was found than without it."
+MOST_NAMED = 3  # causes in a headline; the list has all
+_WORSE = 1.05  # times what it was off by before: a channel that was made worse
 
 
 def words(verdict: Verdict) -> list[str]:
@@ -21,20 +28,20 @@ def words(verdict: Verdict) -> list[str]:
 
 
 def sentences(verdict: Verdict) -> list[str]:
-    """Say a verdict, a sentence or two a paragraph."""
-    out = [_headline(verdict)]
-    out += [_effect(found) for found in verdict.effects]
+    """Say a verdict, a sentence or two a paragraph; a proof that failed comes first."""
+    out = [title(verdict)]
+    if verdict.effects:
+        out.append(failure(verdict) if verdict.judgement.failed else _proof(verdict))
+    out += [_effect(found, verdict) for found in verdict.effects]
     if verdict.minor:
         named = "; ".join(
-            f"{BY_ID[m.id].title} ({m.id}), which moves the robot by {_moves(m.size)}" for m in verdict.minor
+            f"{BY_ID[m.id].title} ({m.id}), which {does(m.size, verdict)}" for m in verdict.minor
         )
         out.append(f"Visible, and too small to matter; it could be: {named}.")
-    if verdict.effects:
-        out.append(_proof(verdict))
-    if verdict.verdict == "missing":
-        out.append(f"What is left moves the robot by {_moves(verdict.residual.size)}, which does not matter.")
+    if verdict.verdict == "missing" and not verdict.judgement.failed:
+        out.append(f"What is left {does(verdict.residual.size, verdict)}, which does not matter.")
     if verdict.verdict.endswith("unexplained"):
-        out.append(_unexplained(verdict))
+        out.append(unexplained(verdict))
     if verdict.located:
         out.append(
             "Where simulation and reality part: " + "; ".join(_place(p) for p in verdict.located[:3]) + "."
@@ -44,8 +51,42 @@ def sentences(verdict: Verdict) -> list[str]:
     return out
 
 
+def title(verdict: Verdict) -> str:
+    """Say in a sentence what is missing; where the proof fails, that first."""
+    if verdict.judgement.failed:
+        return f"{FAILS} What was found, and is not to be relied on: {_names(verdict)}."
+    return _headline(verdict)
+
+
+def failure(verdict: Verdict) -> str:
+    """Say by how much a robot found is further off than the robot as it was."""
+    worse = [
+        _was_now(verdict, column, misfit, short=True)
+        for column, misfit in verdict.judgement.channels.items()
+        if misfit.after > _WORSE * misfit.before
+    ]
+    return f"On {set_aside(verdict)}, root mean square, with what was found and without: {', '.join(worse)}."
+
+
+def set_aside(verdict: Verdict) -> str:
+    """Name what was set aside."""
+    judged = verdict.judgement
+    if judged.by_time:
+        return "the part set aside"
+    return f"recordings not used for the fit ({', '.join(judged.recordings)})"
+
+
+def _names(verdict: Verdict) -> str:
+    """Name what was found, three causes at most; the strongest come first."""
+    titles = [BY_ID[f.id].title for f in sorted(verdict.effects, key=lambda f: -f.holdout_gain)]
+    named, more = titles[:MOST_NAMED], len(titles) - MOST_NAMED
+    if more > 0:
+        named.append(f"{more} smaller {'causes' if more > 1 else 'cause'}")
+    return " and ".join(named) if len(named) < MOST_NAMED else f"{', '.join(named[:-1])}, and {named[-1]}"
+
+
 def _headline(verdict: Verdict) -> str:
-    names = " and ".join(BY_ID[f.id].title for f in verdict.effects)
+    names = _names(verdict)
     return {
         "nothing": _nothing(verdict),
         "missing": f"Missing in the simulation: {names}.",
@@ -60,16 +101,20 @@ def _nothing(verdict: Verdict) -> str:
     left = verdict.residual
     if left.white:
         return "Nothing is missing: the simulation follows these recordings down to the sensors' noise."
-    return f"Nothing material is missing: what is left moves the robot by {_moves(left.size)}, and does not matter."
+    return f"Nothing material is missing: what is left {does(left.size, verdict)}, and does not matter."
 
 
-def _moves(size: Size) -> str:
-    """Say a size."""
+def moves(size: Size, verdict: Verdict) -> str:
+    """Say a size: over a metre, over a whole recording, in a reading, at the arrival."""
     words = []
     if size.mm_1m or size.deg_1m:
+        turned = (
+            ("", "")
+            if on_bench(verdict)
+            else (f" and {size.deg_1m:.1f} degrees", f" and {size.deg_drive:.1f} degrees")
+        )  # a wheel on a bench turns no robot
         words.append(
-            f"{size.mm_1m:.1f} mm and {size.deg_1m:.1f} degrees over a metre ({size.mm_drive:.0f} mm and "
-            f"{size.deg_drive:.1f} degrees over a whole recording)"
+            f"{size.mm_1m:.1f} mm{turned[0]} over a metre ({size.mm_drive:.0f} mm{turned[1]} over a whole recording)"
         )
     if size.reading_pct:
         words.append(f"{size.reading_pct:.1f} % of a reading")
@@ -78,9 +123,21 @@ def _moves(size: Size) -> str:
     return " and ".join(words) or "nothing that can be measured"
 
 
+def does(size: Size, verdict: Verdict) -> str:
+    """Say what an effect of a size does: it moves a robot or a wheel, or changes readings."""
+    if size.reading_pct and not size.mm_1m and not size.deg_1m:
+        return f"changes readings by {size.reading_pct:.1f} %"
+    return f"moves the {'wheel' if on_bench(verdict) else 'robot'} by {moves(size, verdict)}"
+
+
+def on_bench(verdict: Verdict) -> bool:
+    """Whether all recordings are of motors on a bench."""
+    return verdict.evidence is not None and bool(verdict.evidence.motion.problem.on_bench)
+
+
 def limits(verdict: Verdict) -> list[str]:
     """Say which sizes would have been seen, and of what nothing is known, a sentence each."""
-    seen = [f"{e} {_above_limit(e, each)}" for e, each in verdict.limits.items() if each]
+    seen = [f"{e} {_above_limit(e, each, verdict)}" for e, each in verdict.limits.items() if each]
     unseen = [e for e, each in verdict.limits.items() if not each]
     out = []
     if seen:
@@ -90,23 +147,32 @@ def limits(verdict: Verdict) -> list[str]:
     return out
 
 
-def _above_limit(effect: str, limit: Limit) -> str:
+def _above_limit(effect: str, limit: Limit, verdict: Verdict) -> str:
     """Say from what size on an effect shows; a limit or rate vanishes at infinity and shows below."""
+    parameter = BY_ID[effect].parameters[0]
+    if verdict.evidence is not None and not math.isinf(parameter.neutral or 0.0):
+        return f"from {smallest(parameter, limit.size, verdict.evidence.before)}"
     unit = "" if limit.unit == "-" else f" {limit.unit}"
-    side = "below" if math.isinf(BY_ID[effect].parameters[0].neutral or 0.0) else "from"
-    return f"{side} {limit.size:.2g}{unit}"
+    return f"{'below' if math.isinf(parameter.neutral or 0.0) else 'from'} {limit.size:.2g}{unit}"
 
 
-def _effect(found: Found) -> str:
+def _effect(found: Found, verdict: Verdict) -> str:
     effect = BY_ID[found.id]
-    sizes = ", ".join(f"{label} {_interval(i)}" for label, i in found.parameters.items())
+    sizes = ", ".join(sizes_of(found, verdict))
     words = (
         f"{effect.title[0].upper()}{effect.title[1:]} ({effect.id}): {sizes}. It shows in {effect.signature}. "
-        f"It moves the robot by {_moves(found.size)}."
+        f"It {does(found.size, verdict)}."
     )
     if found.alternatives:
         words += f" These recordings can not tell it from {' or '.join(found.alternatives)}."
     return words
+
+
+def sizes_of(found: Found | Minor, verdict: Verdict) -> list[str]:
+    """Say an effect's parameters, in units people use where the robot as it was is known."""
+    if verdict.evidence is None:
+        return [f"{label} {_interval(i)}" for label, i in found.parameters.items()]
+    return [str(q) for q in quantities(found.id, found.parameters, verdict.evidence.before)]
 
 
 def _interval(i: Interval) -> str:
@@ -115,24 +181,52 @@ def _interval(i: Interval) -> str:
 
 
 def _proof(verdict: Verdict) -> str:
-    judged = verdict.judgement
-    closed = {
-        name: (m.before - m.after) / (m.before - m.floor)
-        for name, m in judged.channels.items()
-        if m.before > 1.5 * m.floor and m.before > 1.2 * m.after
+    gaps = {
+        name: m
+        for name, m in verdict.judgement.channels.items()
+        if max(m.before, m.after) > VISIBLE * m.floor
     }
-    parts = ", ".join(f"{share:.0%} in {name}" for name, share in closed.items())
-    where = (
-        "the part set aside"
-        if judged.by_time
-        else f"recordings not used for the fit ({', '.join(judged.recordings)})"
+    where = set_aside(verdict)
+    if not gaps:
+        return f"Judged on {where}, where every channel shows noise alone."
+    closed = verdict.judgement.gap_closed
+    share = "" if closed is None or closed < 0.0 else f" {closed:.0%} of the gap is closed:"
+    return (
+        f"On {where}, root mean square:{share} {'; '.join(_was_now(verdict, c, m) for c, m in gaps.items())}."
     )
-    return f"On {where} this explains of the mismatch: {parts}." if parts else f"Judged on {where}."
 
 
-def _unexplained(verdict: Verdict) -> str:
+def _was_now(verdict: Verdict, column: str, misfit: Misfit, short: bool = False) -> str:
+    """Say what a column was off by, is off by now, and would be by noise alone."""
+    name = CHANNEL_WORDS[_CHANNELS[column]]
+    was, now, noise = in_units(column, misfit)
+    if short:
+        return f"{name} off by {now} instead of {was}"
+    rolled = ""
+    if column.endswith("angle_deg") and not math.isnan(misfit.deviation):
+        mm = math.radians(misfit.deviation) * 1e3 * verdict.robot.body.wheel_radius
+        rolled = f", rolled {amount(mm * misfit.before, 'mm')} → {amount(mm * misfit.after, 'mm')}"
+    worse = ", worse" if misfit.after > _WORSE * misfit.before else ""
+    return f"{name} off by {was} → {now}{rolled}{worse} (noise alone {noise})"
+
+
+def in_units(column: str, misfit: Misfit) -> tuple[str, str, str]:
+    """Say what a column was off by, is off by now, and would be by noise alone, root mean square."""
+    if math.isnan(misfit.deviation):
+        return f"{misfit.before:.3f}", f"{misfit.after:.3f}", f"{misfit.floor:.3f}"
+    factor, unit = _UNITS[column.rsplit("_", 1)[1]]
+    scale = factor * misfit.deviation
+    return (
+        amount(scale * misfit.before, unit),
+        amount(scale * misfit.after, unit),
+        amount(scale * misfit.floor, unit),
+    )
+
+
+def unexplained(verdict: Verdict) -> str:
+    """Say what is left that nothing explains."""
     shown = verdict.located[0] if verdict.located else None
-    words = f"No effect in the catalogue explains what is left: it moves the robot by {_moves(verdict.residual.size)}."
+    words = f"No effect in the catalogue explains what is left: it {does(verdict.residual.size, verdict)}."
     if shown is not None:
         words += f" It shows most in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
     if verdict.residual.formula:

@@ -81,7 +81,7 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     write_robot(verdict.robot, out / "robot.toml")
     if task.pictures:
         tell("pictures")
-        _draw(verdict, out)
+        draw(verdict, out)
     return Told(words(verdict), table, {})
 
 
@@ -162,13 +162,27 @@ def _written(output: Output, out: Path, told: Told) -> dict[str, Any]:
     return told.table
 
 
-def _draw(verdict: Verdict, out: Path) -> None:
-    """Write the pictures, and report.html with the pictures inside."""
-    from gecar.plots.reality.verdict import verdict_figures
+def draw(verdict: Verdict, out: Path) -> None:
+    """Write the pictures, the data behind them, and report.html."""
+    from gecar.plots.reality.replay_page import replay_page
+    from gecar.plots.reality.verdict import verdict_figures, verdict_tables
     from gecar.plots.style import save
-    from gecar.report.verdict_page import verdict_page
+    from gecar.reality.compare.choices import tell
+    from gecar.report.verdict_page import article, first_screen, picture_html
 
-    paths = {name: save(figure, out / f"{name}.png") for name, figure in verdict_figures(verdict).items()}
+    told = tell(verdict)
+    paths = {
+        name: save(figure, out / f"{name}.png") for name, figure in verdict_figures(verdict, told).items()
+    }
+    tables = verdict_tables(verdict, told)
+    for name, table in tables.items():
+        write_whole(out / f"{name}.csv", table)
+    words = (
+        "How dense the mismatch is in each channel and motion, times the average; the data are below as CSV."
+    )
+    picture = picture_html("In what motion it shows", paths["where"].read_bytes(), words)
+    inside = {name: table for name, table in tables.items() if name in ("gap", "where")}
+    below = article(verdict, told.choices, inside, picture)
     write_whole(
-        out / "report.html", verdict_page(verdict, {name: path.read_bytes() for name, path in paths.items()})
+        out / "report.html", replay_page(verdict, told.shown, first_screen(verdict, told.shown), below)
     )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,10 +19,7 @@ from gecar.plots.courses.course import draw_course
 from gecar.plots.style import (
     BLUE,
     FAINT,
-    GREEN,
-    INK,
     LIGHT,
-    ORANGE,
     SOFT,
     SPEED_COLOURS,
     VERMILION,
@@ -27,55 +27,91 @@ from gecar.plots.style import (
     look,
     new_figure,
 )
+from gecar.reality.compare.choices import Told, tell
+from gecar.reality.compare.side_by_side import UNITS, Beside, measure_of, typical, unit_of
 from gecar.reality.evidence import Evidence
-from gecar.reality.locate.misfit_energy import STRETCH_S, stretch_errors
 from gecar.reality.replay.channels import CHANNELS
-from gecar.reality.residuals.of_recording import RecordingResiduals
-from gecar.reality.verdict import Place, Verdict
+from gecar.reality.verdict import Misfit, Place, Verdict
 from gecar.world.course.course import load_course
+from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
-Physics = npt.NDArray[Any]
 
-_DEG = 180.0 / np.pi
-# Name and unit of each channel's errors, that unit in the channel's own, and whether traces always show it.
-_SHOWN = {
-    "left_angle": ("left wheel [deg]", _DEG, True), "right_angle": ("right wheel [deg]", _DEG, True),
-    "battery": ("battery [V]", 1.0, False), "yaw_rate": ("gyro [deg/s]", _DEG, False), "x": ("x [mm]", 1e3, True),
-    "y": ("y [mm]", 1e3, True), "heading": ("heading [deg]", _DEG, True), "reflection": ("reflection [%]", 1.0, False),
-}  # fmt: skip
+MOST_CHOICES = 4
 SHOWN_REGIMES = 12
 
 
-def verdict_figures(verdict: Verdict) -> dict[str, Figure]:
+def verdict_figures(verdict: Verdict, told: Told | None = None) -> dict[str, Figure]:
     """Draw a verdict's pictures, by the name of their file.
 
     Parameters
     ----------
     verdict
         As `gecar.reality.discovery.discover` returns it.
+    told
+        What was replayed for it, where that was done before.
     """
-    return {name: draw(verdict) for name, draw in verdict_drawings(verdict).items()}
+    told = told or tell(verdict)
+    return {name: draw(verdict) for name, draw in verdict_drawings(verdict, told).items()}
 
 
-def verdict_drawings(verdict: Verdict) -> dict[str, Callable[[Verdict], Figure]]:
+def verdict_drawings(verdict: Verdict, told: Told | None = None) -> dict[str, Callable[[Verdict], Figure]]:
     """Return what draws each of a verdict's pictures, by the name of its file."""
     drawings: dict[str, Callable[[Verdict], Figure]] = {
         "gap": gap_figure,
         "where": regimes_figure,
-        "traces": traces_figure,
-        "tried": tried_figure,
+        "traces": partial(traces_figure, told=told),
+        "tried": partial(tried_figure, told=told),
     }
     if any(run.replayer.has_poses for run in verdict.evidence.fitted.recordings):
         drawings["map"] = map_figure
     return drawings
 
 
+def verdict_tables(verdict: Verdict, told: Told) -> dict[str, str]:
+    """Return the data behind the pictures as CSV, by the name of the picture."""
+    where = verdict.evidence.where
+    rows: dict[str, list[list[Any]]] = {
+        "gap": [
+            ["channel", "nrmse_before", "nrmse_after", "nrmse_noise_alone", "standard_deviation_measured"]
+        ],
+        "where": [["channel", "motion", "mismatch_times_average"]],
+        "tried": [["choice", "candidate", "left", "unit", "taken"]],
+        "traces": [["recording", "channel", "unit", "t_s", "measured", "before", "after"]],
+    }
+    rows["gap"] += [
+        [c, m.before, m.after, m.floor, m.deviation] for c, m in verdict.judgement.channels.items()
+    ]
+    for k, channel in enumerate(CHANNELS):
+        found = [[channel, name, _density(where, k, mask)] for name, mask in where.masks.items()]
+        rows["where"] += [row for row in found if not np.isnan(row[2])]
+    for number, choice in enumerate(told.choices, start=1):
+        unit = UNITS[choice.measure]
+        rows["tried"].append([number, "none", choice.before, unit, "no"])
+        rows["tried"] += [[number, r.effect, r.left, unit, "yes" if r.taken else "no"] for r in choice.rivals]
+    if (run := _shown_run(verdict, told)) is not None:
+        for name, curves in run.curves.items():
+            rows["traces"] += [[run.name, name, unit_of(name), *at] for at in zip(*curves, strict=True)]
+    if any(run.replayer.has_poses for run in verdict.evidence.fitted.recordings):
+        rows["map"] = [["recording", "t_s", "x_m", "y_m", "mismatch"]]
+        for one, path, loud in zip(where.runs, where.path, _loudness(verdict), strict=True):
+            seen = np.flatnonzero(~np.isnan(path[:, 0]))
+            rows["map"] += [[one.recording.name, 0.1 * k, *path[k], loud[k]] for k in seen]
+    return {name: _csv(table) for name, table in rows.items() if len(table) > 1}
+
+
+def _csv(rows: list[list[Any]]) -> str:
+    stream = io.StringIO()
+    words = [[f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in rows]
+    csv.writer(stream, lineterminator="\n").writerows(words)
+    return stream.getvalue()
+
+
 def gap_figure(verdict: Verdict) -> Figure:
     """Draw each channel's misfit on the recordings set aside: before, after, and what noise leaves."""
     channels = verdict.judgement.channels
     names = list(channels)
-    figure = new_figure(8.0, 2.2 + 0.4 * len(names))
+    figure = new_figure(8.0, 2.2 + 0.5 * len(names))
     with look():
         axes = figure.add_subplot()
         at = np.arange(len(names))[::-1]
@@ -85,14 +121,24 @@ def gap_figure(verdict: Verdict) -> Figure:
         axes.plot([channels[n].before for n in names], at, "o", color=VERMILION, label="before")
         axes.plot([channels[n].after for n in names], at, "o", color=BLUE, label="after")
         axes.plot([channels[n].floor for n in names], at, "|", color=SOFT, markersize=13, label="noise alone")
-        axes.set(
-            xscale="log", xlabel="NRMSE on recordings not used for the fit", yticks=at, yticklabels=names
-        )
+        words = [f"{n.rsplit('_', 1)[0].replace('_', ' ')}\n{_in_units(n, channels[n])}" for n in names]
+        axes.set(xscale="log", yticks=at, yticklabels=words)
+        axes.set_xlabel("NRMSE on recordings not used for the fit (1: as bad as a constant)")
         axes.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, 1.0 + 0.6 / max(len(names), 1)))
         headline(
             figure, "How much of the gap is closed", f"judged on {', '.join(verdict.judgement.recordings)}"
         )
     return figure
+
+
+def _in_units(column: str, misfit: Misfit) -> str:
+    """Say what a column was off by and is now, in its unit."""
+    unit = column.rsplit("_", 1)[1]
+    factor, shown = {"m": (1e3, "mm"), "dps": (1.0, "deg/s"), "pct": (1.0, "%"), "v": (1.0, "V")}.get(
+        unit, (1.0, unit)
+    )
+    was, now = (factor * misfit.deviation * v for v in (misfit.before, misfit.after))
+    return f"{was:.2g} to {now:.2g} {shown}" if max(was, now) < 100.0 else f"{was:.0f} to {now:.2g} {shown}"
 
 
 def regimes_figure(verdict: Verdict) -> Figure:
@@ -126,78 +172,78 @@ def _density(where: object, channel: int, mask: npt.NDArray[np.bool_]) -> float:
     return float((energy[mask].sum() / inside) / (energy.sum() / samples.sum()))
 
 
-def tried_figure(verdict: Verdict) -> Figure:
-    """Draw what each effect refitted would gain, stage by stage, beside the null."""
-    evidence: Evidence = verdict.evidence
-    stages = [*evidence.motion.tried, *(evidence.sensing.tried if evidence.sensing else ())]
-    stages = [s for s in stages if s][:4]
-    figure = new_figure(8.0, 2.0 + 1.5 * max(len(stages), 1))
-    taken = {found.id: found.null_95 for found in verdict.effects}
+def tried_figure(verdict: Verdict, told: Told | None = None) -> Figure:
+    """Draw what each candidate leaves on the recordings set aside, choice by choice, beside what nothing leaves."""
+    made = (told or tell(verdict)).choices[:MOST_CHOICES]
+    rows = [len(choice.telling) + 1 for choice in made]
+    figure = new_figure(8.6, 1.6 + 0.3 * sum(rows) + 0.5 * len(rows))
     with look():
-        for number, steps in enumerate(stages):
-            axes = figure.add_subplot(len(stages), 1, number + 1)
-            at = np.arange(len(steps))[::-1]
-            colours = [GREEN if s.effect in taken else (ORANGE if s.worthwhile else FAINT) for s in steps]
-            axes.barh(at, [max(s.gain, 1.0) for s in steps], color=colours)
-            axes.set_yticks(at, [s.effect.replace("_", " ") for s in steps])
-            null = next((taken[s.effect] for s in steps if s.effect in taken), None)
-            if null is not None:
-                axes.axvline(null, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
-            axes.set(
-                xscale="log", xlabel="gain: what the effect lowers the cost by" if steps is stages[-1] else ""
-            )
-        detail = "green: taken; grey: too small for a name; dashed: largest gain without a cause, 95 %"
-        headline(figure, "What was tried", detail)
-    return figure
-
-
-def traces_figure(verdict: Verdict) -> Figure:
-    """Draw what replays of short stretches leave in the recording where mismatch shows most, its spans marked."""
-    evidence: Evidence = verdict.evidence
-    place = verdict.located[0] if verdict.located else None
-    run = next(
-        (s for s in evidence.fitted.recordings if place and s.recording.name == place.recording),
-        evidence.fitted.recordings[0],
-    )
-    before = _traces(run, evidence.before.physics, evidence.motion.taken.physics)
-    after = _traces(run, verdict.robot.physics, verdict.robot.physics)
-    loudest = f"; shaded: where {place.channel.replace('_', ' ')} is loudest" if place else ""
-    pointed = {p.channel for p in verdict.located}
-    seen = [name for name in before if _SHOWN[name][2] or name in pointed]
-    figure = new_figure(9.0, 2.2 + 1.1 * len(seen))
-    with look():
-        for number, name in enumerate(seen):
-            axes = figure.add_subplot(len(seen), 1, number + 1)
-            _mark(axes, place)
-            for traces, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
-                axes.plot(*traces[name], color=colour, linewidth=0.9, label=label)
-            axes.set(ylabel=_SHOWN[name][0], xlim=(0, run.replayer.t[-1]))
-            axes.tick_params(labelbottom=name == seen[-1])
-            if number == 0:
-                axes.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
-        if seen:
-            axes.set_xlabel("time [s]")
-        headline(
-            figure,
-            f"Measured less simulated, in {run.recording.name}",
-            f"replays of {STRETCH_S:g} s, each from where the robot was" + loudest,
+        grid = figure.add_gridspec(max(len(made), 1), 1, height_ratios=rows or [1])
+        for number, choice in enumerate(made):
+            axes, unit = figure.add_subplot(grid[number]), UNITS[choice.measure]
+            bars = [
+                (
+                    "without it" if any(r.taken for r in choice.rivals) else "nothing added",
+                    choice.before,
+                    VERMILION,
+                )
+            ]
+            bars += [(BY_ID[r.effect].title, r.left, BLUE if r.taken else FAINT) for r in choice.telling]
+            bars.sort(key=lambda bar: bar[1])
+            axes.barh([name for name, *_ in bars], [left for _, left, _ in bars], color=[c for *_, c in bars])
+            for row, (_, left, _) in enumerate(bars):
+                axes.annotate(
+                    f"{left:.3g}", (left, row), (4, 0), textcoords="offset points", va="center", size=8
+                )
+            axes.margins(x=0.1)
+            axes.set_xlabel(f"off by [{unit}]" if choice is made[-1] else "")
+            axes.grid(visible=False, axis="y")
+        if not made:
+            figure.add_subplot().set_axis_off()
+        others = "; what takes nothing away is left out"
+        detail = (
+            f"on recordings set aside, each fitted in turn; blue: taken{others}"
+            if made
+            else "nothing stood out"
         )
+        headline(figure, "What was tried, and what it leaves", detail)
     return figure
 
 
-def _traces(run: RecordingResiduals, motion: Physics, sight: Physics) -> dict[str, tuple[Array, Array]]:
-    """Return times and errors by channel, in the units shown; stretches are parted by a gap."""
-    sd = run.replayer.inputs.sd[[0, 0, 1, 2, 3, 3, 4]]
-    out = {}
-    for channel, t, errors in stretch_errors(run, motion):
-        if len(t):
-            name = CHANNELS[channel]
-            cuts = 1 + np.flatnonzero(np.diff((t / STRETCH_S).astype(int)))
-            values = _SHOWN[name][1] * sd[channel] * errors
-            out[name] = (np.insert(t, cuts, np.nan), np.insert(values, cuts, np.nan))
-    if run.reads:
-        out["reflection"] = (run.replayer.t, run.recording.reflection_pct - run.readings(sight))
-    return out
+def traces_figure(verdict: Verdict, told: Told | None = None) -> Figure:
+    """Draw what was measured and simulated, before and after, in the recording where mismatch shows most."""
+    run = _shown_run(verdict, told or tell(verdict))
+    assert run is not None  # a case has a recording, and that has rows
+    place = next((p for p in verdict.located if p.recording == run.name), None)
+    names = list(run.curves)
+    figure = new_figure(9.0, 1.6 + 1.25 * len(names))
+    with look():
+        for number, name in enumerate(names):
+            axes, curves = figure.add_subplot(len(names), 1, number + 1), run.curves[name]
+            _mark(axes, place)
+            axes.plot(curves.t_s, curves.measured, color=FAINT, linewidth=4.0, label="measured")
+            for values, colour, label in (
+                (curves.before, VERMILION, "before"),
+                (curves.after, BLUE, "after"),
+            ):
+                axes.plot(curves.t_s, values, color=colour, linewidth=1.1, label=label)
+            axes.set(ylabel=f"{name.replace('_', ' ')} [{unit_of(name)}]", xlim=(0, run.duration_s))
+            axes.yaxis.label.set_fontsize(8)
+            axes.tick_params(labelbottom=name == names[-1])
+            if number == 0:
+                axes.legend(loc="lower right", ncols=3, bbox_to_anchor=(1.0, 1.0))
+        if names:
+            axes.set_xlabel("time [s]")
+        loudest = f"; shaded: where {place.channel.replace('_', ' ')} is loudest" if place else ""
+        headline(figure, f"Measured, and simulated before and after: {run.name}", f"whole replays{loudest}")
+    return figure
+
+
+def _shown_run(verdict: Verdict, told: Told) -> Beside | None:
+    """Return the recording that is pointed at, or else a typical one."""
+    pointed = verdict.located[0].recording if verdict.located else ""
+    named = next((each for each in told.shown if each.name == pointed), None)
+    return named or typical(told.shown, measure_of(verdict)) or next(iter(told.shown), None)
 
 
 def _mark(axes: Axes, place: Place | None) -> None:
@@ -209,7 +255,7 @@ def map_figure(verdict: Verdict) -> Figure:
     """Draw the ways over the course, coloured by how much mismatch arises there."""
     evidence: Evidence = verdict.evidence
     where = evidence.where
-    energy = np.maximum(where.energy[[0, 1, 4, 5, 6]].sum(axis=0), 0.0)
+    energy = _loudness(verdict)
     setup = evidence.fitted.recordings[0].recording.setup
     figure = new_figure(9.0, 5.6)
     with look():
@@ -237,6 +283,11 @@ def map_figure(verdict: Verdict) -> Figure:
             figure, "Where on the floor mismatch arises", "bright: much; circle: a place that stands out"
         )
     return figure
+
+
+def _loudness(verdict: Verdict) -> Array:
+    """Return how much mismatch of wheels and pose arises, shape (recordings, bins)."""
+    return np.asarray(np.maximum(verdict.evidence.where.energy[[0, 1, 4, 5, 6]].sum(axis=0), 0.0))
 
 
 def _circle(x: float, y: float, radius: float) -> Circle:
