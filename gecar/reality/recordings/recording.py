@@ -16,8 +16,10 @@ from gecar.errors import expected
 from gecar.files import write_whole
 from gecar.reality.recordings.columns import COLUMNS, Series
 from gecar.reality.recordings.csv_reader import read_table
+from gecar.reality.recordings.encoder_zero import encoder_zero
 from gecar.reality.recordings.setup import Setup, read_setup, setup_toml
 
+ANGLES = ("left_angle_deg", "right_angle_deg")
 LONGEST_S = 36_000.0  # a replay simulates every millisecond between two rows, however few there are
 
 
@@ -96,6 +98,8 @@ def make_recording(
 ) -> Recording:
     """Make a recording from columns in the file's own names and units; those missing become NaN.
 
+    Wheels' angles are counted from where they stood when the recording began (`encoder_zero`).
+
     Raises
     ------
     InputError
@@ -106,7 +110,9 @@ def make_recording(
     rows = len(columns["t_s"])
     series = {}
     for column, (to, factor) in COLUMNS.items():
-        series[to] = columns.get(column, np.full(rows, np.nan)) * factor
+        values = columns.get(column, np.full(rows, np.nan))
+        zero = encoder_zero(columns["t_s"], values) if column in ANGLES else 0.0
+        series[to] = (values - zero) * factor
         series[to].flags.writeable = False
     return Recording(name=name, **series, setup=setup, warnings=tuple(warnings))
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from gecar.reality.recordings.camera_frame import axle_pose
+from gecar.reality.recordings.encoder_zero import LATEST_FIRST_ROW_S
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_input import KernelInput
@@ -28,8 +29,6 @@ DEG = np.pi / 180.0
 # What replays assume where a recording says nothing: whole degrees, 10 mV, 0.5 deg/s, 1 mm, 0.3 deg.
 USUAL_NOISE = (0.29 * DEG, 0.01, 0.5 * DEG, 0.001, 0.3 * DEG)
 USUAL_WALK = (3e-4, 0.1 * DEG)  # m/sqrt(s), rad/sqrt(s)
-# A command acts from the log's zero where its first row comes at most this much later.
-LATEST_FIRST_ROW_S = 0.1
 FEWEST_LANES = 4  # fewer robots are replayed faster one by one
 
 
