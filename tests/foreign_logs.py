@@ -19,13 +19,19 @@ BRICK = (
 POSE = ("t_s", "x_m", "y_m", "heading_deg")
 
 
-def import_texts(folder, *texts, setup=None, **options):
-    """Write files and import them; return what came of it."""
+def import_texts(folder, *texts, **options):
+    """Write files and import them; return the one recording that came of it."""
+    (imported,) = import_all(folder, *texts, **options)
+    return imported
+
+
+def import_all(folder, *texts, setup=None, robot="ev3", **options):
+    """Write files and import them; return all recordings that came of it."""
     paths = []
     for k, text in enumerate(texts):
         paths.append(folder / f"file{k}.txt")
         paths[-1].write_bytes(text if isinstance(text, bytes) else text.encode())
-    return import_logs(paths, load_robot("ev3"), setup or Setup(), ImportOptions(**options))
+    return import_logs(paths, load_robot(robot), setup or Setup(), ImportOptions(**options))
 
 
 def table(recording, columns, *, names=None, separator=",", factors=None, rows=slice(None), shift=0.0):

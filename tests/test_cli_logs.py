@@ -69,7 +69,11 @@ def test_import_writes_a_recording_and_says_what_it_took_for_what(gecar, logs, p
         (("--origin", "1"), "--origin"),
         (("--scale", "-1"), "--scale"),
         (("--offset", "nan"), "--offset"),
-        (("--out", "here"), "--out"),
+        (("--out", "here.txt"), "--out"),
+        (("--duty-cap", "120"), "--duty-cap"),
+        (("--counts", "0"), "--counts"),
+        (("--command", "t_s=1"), "--command"),
+        (("--command", "open(1)"), "'open(1)'"),
         (("--course", "none", "--place"), "a course with a START"),
         (("--course", "nowhere"), "nowhere"),
         (("--run", "4"), "--run"),
@@ -80,5 +84,13 @@ def test_import_names_what_is_wrong(gecar, logs, options, named):
     assert named in gecar.error("import", *logs, *options)
 
 
-def test_import_of_three_files_is_refused(gecar, logs):
-    assert "found 3 files" in gecar.error("import", *logs, "log.csv")
+def test_several_logs_in_one_call_are_several_recordings(gecar, logs, tmp_path):
+    (tmp_path / "second.csv").write_text((tmp_path / "log.csv").read_text())
+    found = gecar("import", "log.csv", "second.csv", "--out", "case", "--json").json["recordings"]
+    assert [each["recording"] for each in found] == ["case/log.csv", "case/second.csv"]
+    again = gecar("import", "log.csv", "second.csv", "--out", "case/run.csv", "--json").json["recordings"]
+    assert [each["recording"] for each in again] == ["case/run_1.csv", "case/run_2.csv"]
+
+
+def test_a_camera_for_one_of_two_runs_is_refused(gecar, logs):
+    assert "expected a camera's log for each" in gecar.error("import", *logs, "log.csv")

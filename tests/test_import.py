@@ -17,6 +17,7 @@ from synthetic import drive
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.importing.command_formula import command_of
 from gecar.reality.recordings.importing.frame import Frame
 from gecar.reality.recordings.importing.meaning import guess_meanings, parse_said
 from gecar.reality.recordings.recording import read_recording, write_recording
@@ -169,7 +170,7 @@ def test_command_that_was_not_logged_is_said(bring_in):
     text = "time, angle\n" + "\n".join(f"{t}, {t // 2}" for t in range(3, 1000, 10))
     with pytest.raises(InputError, match="no column looks like a command to a motor"):
         bring_in(text)
-    imported = bring_in(text, constant={"left_duty_pct": 60.0}, setup=Setup(rig="bench"))
+    imported = bring_in(text, commands={"left_duty_pct": command_of("60")}, setup=Setup(rig="bench"))
     np.testing.assert_allclose(imported.recording.left_duty, 0.6)
     assert imported.recording.left_angle_rad[-1] == pytest.approx(np.deg2rad(496))
 
@@ -217,7 +218,7 @@ def test_what_the_user_says_wrongly_is_named(text, message):
         ("x [mm]", "x_m", "mm"),
         ("pos_y_cm", "y_m", "cm"),
         ("theta_deg", "heading_deg", "deg"),
-        ("left_speed", None, None),
+        ("left_speed", "left_speed_dps", None),
         ("comment", None, None),
     ],
 )

@@ -96,7 +96,7 @@ PRACTICE = sorted((Path(__file__).parents[2] / "shared/recordings/practice/p01")
 def test_practice_recordings_come_through_as_they_are(tmp_path):
     for path in PRACTICE:
         recording = read_recording(path)
-        imported = import_logs([path], load_robot("ev3"), Setup(), ImportOptions())
+        (imported,) = import_logs([path], load_robot("ev3"), Setup(), ImportOptions())
         assert imported.repairs == ()
         assert_same(imported, recording, tuple(COLUMNS)[:10], atol=1e-9)
 

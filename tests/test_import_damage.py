@@ -9,6 +9,7 @@ from foreign_logs import (
     assert_same,
     brick_log,
     camera_log,
+    import_all,
     import_texts,
     pose_errors,
     with_line,
@@ -54,19 +55,41 @@ def test_repeated_and_misplaced_times_are_left_out(bring_in, run):
     assert any("1 rows whose time is out of order (3.5)" in line for line in imported.repairs)
 
 
-def test_clock_that_starts_again_keeps_the_longer_stretch(bring_in, run):
-    short, long = brick_log(run, rows=slice(0, 200)), brick_log(run)
-    imported = bring_in(short + long.split("\n", 1)[1])
-    assert_same(imported, run, atol=1e-8)
-    assert any("stretches of 200, 1200 rows" in line for line in imported.repairs)
+@pytest.mark.parametrize("between", ["", "Start again\n"])
+def test_every_run_of_a_file_becomes_a_recording(tmp_path, run, between):
+    first, header = brick_log(run, rows=slice(0, 200)), brick_log(run)
+    second = (
+        header if between else header.split("\n", 1)[1]
+    )  # the names again, or the clock alone starts again
+    short, long = import_all(tmp_path, first + between + second)
+    assert (short.recording.name, long.recording.name) == ("file0_1", "file0_2")
+    assert len(short.recording.t_s) == 200
+    assert_same(long, run, atol=1e-8)
 
 
-def test_one_of_several_runs_in_a_file(bring_in, run):
+def test_one_of_several_runs_in_a_file(tmp_path, run):
     text = brick_log(run, rows=slice(0, 200)) + "Start again\n" + brick_log(run)
-    assert_same(bring_in(text), run, atol=1e-8)
-    assert len(bring_in(text, run=1).recording.t_s) == 200
+    (only,) = import_all(tmp_path, text, run=1)
+    assert len(only.recording.t_s) == 200
     with pytest.raises(InputError, match="--run: found 3, expected 1 to 2"):
-        bring_in(text, run=3)
+        import_all(tmp_path, text, run=3)
+
+
+def test_a_few_rows_before_the_clock_starts_again_are_left_out(bring_in, run):
+    first, again = brick_log(run, rows=slice(0, 8)), brick_log(run).split("\n", 1)[1]
+    imported = bring_in(first + again)
+    assert_same(imported, run, atol=1e-8)
+    assert "file0.txt: left out a run of 8 rows" in imported.repairs
+
+
+def test_a_file_of_which_most_rows_would_go_is_refused(bring_in, run):
+    rows = brick_log(run).strip().split("\n")
+    cut = [row.rsplit(",", k % 5)[0] for k, row in enumerate(rows[1:])]
+    with pytest.raises(InputError, match="of 1200 lines with numbers are rows of 7 columns"):
+        bring_in("\n".join([rows[0], *cut]))
+    coarse = [f"{float(row.split(',')[0]):.0f},{row.split(',', 1)[1]}" for row in rows[1:]]
+    with pytest.raises(InputError, match="rows repeat the time of the next: its clock is too coarse"):
+        bring_in("\n".join([rows[0], *coarse]))
 
 
 def test_times_in_milliseconds_under_a_name_that_says_seconds(bring_in, run):
@@ -180,7 +203,7 @@ def test_damage_is_mended_or_refused_and_never_crashes(tmp_path_factory, run, ed
     path = tmp_path_factory.mktemp("damaged") / "run.csv"
     path.write_bytes(bytes(text))
     for read in (
-        lambda: import_logs([path], load_robot("ev3"), Setup(), ImportOptions()).recording,
+        lambda: import_logs([path], load_robot("ev3"), Setup(), ImportOptions())[0].recording,
         lambda: read_recording(path),
     ):
         try:

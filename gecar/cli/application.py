@@ -82,7 +82,7 @@ COMMANDS = (
     CommandEntry("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
     CommandEntry("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     CommandEntry("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
-    CommandEntry("import", ROBOT, "Make a recording from the logs people have on disk.", "import_:import_"),
+    CommandEntry("import", ROBOT, "Make recordings from the logs people have on disk.", "import_:import_"),
     CommandEntry("motor", ROBOT, "Draw motor speed over speed and duty commands: Figs 7, 8.", "motor:motor"),
     CommandEntry(
         "compare", ROBOT, "Compare simulation and recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"

@@ -74,10 +74,10 @@ def recording(raw: bytes, folder: Path) -> None:
 
 
 def log(raw: bytes, folder: Path) -> None:
-    """Import one log or two, write the recording, and read it as strictly as any."""
+    """Import one log or more, write the recordings, and read them as strictly as any."""
     paths = [_file(folder, f"file{k}.txt", part) for k, part in enumerate(raw.split(PARTED, 2))]
-    imported = import_logs(paths, _ev3(), Setup(rig="bench"), ImportOptions())
-    _must(_reads_back(imported.recording, folder), "what was imported is a recording")
+    for imported in import_logs(paths, _ev3(), Setup(rig="bench"), ImportOptions()):
+        _must(_reads_back(imported.recording, folder), "what was imported is a recording")
 
 
 def run(raw: bytes, folder: Path) -> None:

@@ -1,9 +1,10 @@
-"""``gecar import``: make a recording from the logs people have on disk."""
+"""``gecar import``: make recordings from the logs people have on disk."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +14,9 @@ from gecar.cli.output import JsonOption, Output
 from gecar.errors import expected
 
 if TYPE_CHECKING:
+    from gecar.reality.recordings.columns import Series
     from gecar.reality.recordings.importing.frame import Frame
+    from gecar.reality.recordings.importing.log import Commands
     from gecar.reality.recordings.importing.logs import Imported
     from gecar.reality.recordings.setup import Setup
 
@@ -23,12 +26,13 @@ FILES, CAMERA, RUN = "What the files hold", "The camera", "What the recording is
 def import_(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG", show_default=False,
-                       help="The brick's log; and the camera's of the same run, if there is one, in any order."),
+        typer.Argument(metavar="LOG...", show_default=False,
+                       help="Robots' logs, each of one run or several; and cameras' logs of these runs."),
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="The recording (.csv; a .toml goes beside it).",
+        typer.Option("--out", metavar="FILE|FOLDER",
+                     help="The recording (.csv; a .toml goes beside it), or where recordings go.",
                      show_default="recordings/LOG.csv"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write over a recording that is there.")] = False,
@@ -47,11 +51,26 @@ def import_(
         typer.Option("--names", metavar="A,B,...", rich_help_panel=FILES, show_default=False,
                      help="The columns' names, for a file that has none."),
     ] = None,
+    command: Annotated[
+        list[str] | None,
+        typer.Option("--command", metavar="[COLUMN=]FORMULA", rich_help_panel=FILES, show_default=False,
+                     help='A command that was not logged, as a formula of the time t [s]: "100*sin(2*pi*t)".'),
+    ] = None,
+    counts: Annotated[
+        float | None,
+        typer.Option("--counts", metavar="N", rich_help_panel=FILES, show_default=False,
+                     help="Counts of the encoders per turn of a wheel, where they count no degrees."),
+    ] = None,
     run: Annotated[
         int | None,
         typer.Option("--run", metavar="N", rich_help_panel=FILES, help="Which run, where a file holds several.",
-                     show_default="the longest"),
+                     show_default="all, each a recording"),
     ] = None,
+    one_clock: Annotated[
+        bool,
+        typer.Option("--one-clock", rich_help_panel=FILES,
+                     help="All files are of one run, timed by one clock, such as topics of a ROS bag."),
+    ] = False,
     offset: Annotated[
         float | None,
         typer.Option("--offset", metavar="S", rich_help_panel=CAMERA, show_default="found from motion",
@@ -93,11 +112,18 @@ def import_(
         bool, typer.Option("--place", rich_help_panel=CAMERA, help="Move and turn the path to start on START."),
     ] = False,
     robot: Annotated[
-        str, typer.Option("--robot", metavar="NAME|FILE", rich_help_panel=RUN, help="Who drove."),
+        str, typer.Option("--robot", metavar="NAME|FILE", rich_help_panel=RUN,
+                          help="Who drove; of a motor alone a file with motor, battery and drive will do."),
     ] = "ev3",
     course: Annotated[
         str, typer.Option("--course", metavar="NAME|FILE|none", rich_help_panel=RUN, help="Where; none: blank floor."),
     ] = "paper",
+    duty_cap: Annotated[
+        float | None,
+        typer.Option("--duty-cap", metavar="PCT", rich_help_panel=RUN,
+                     help="Largest duty that reached the motors, in percent; 100: no cap. Robot ev3 has 80.",
+                     show_default="by the wheels' speeds, or the robot's"),
+    ] = None,
     bench: Annotated[
         bool, typer.Option("--bench", rich_help_panel=RUN, help="Wheels in the air, or one motor alone."),
     ] = False,
@@ -109,18 +135,21 @@ def import_(
     notes: Annotated[str, typer.Option("--notes", rich_help_panel=RUN, help="Anything else.")] = "",
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Make a recording from the logs people have on disk.
+    """Make recordings from the logs people have on disk.
 
-    Reads Pybricks DataLogs, text copied from a terminal, Tracker's exports and cameras' tables; guesses columns,
-    units and axes, and says what it guessed; aligns the camera's clock by motion; mends what is safe to mend,
-    with a line each, and refuses the rest with a reason.
+    Reads text (Pybricks DataLogs, Arduino's and other terminals' output, Tracker's exports, cameras' tables, ROS topics
+    as CSV), MATLAB files up to version 7, and Excel workbooks. Guesses columns, units and axes, and says what it took;
+    aligns the camera's clock by motion; mends what is safe to mend, with a line each, and refuses the rest with a
+    reason. Every run in a file becomes a recording.
 
     [bold]Examples[/]
 
       gecar import gecar_log_2026_11_21.csv
       gecar import terminal.txt tracker.txt --place --program best.txt
       gecar import log.csv camera.csv --origin 112,940 --mark 0.04,0 --out case/run_1.csv
-      gecar import step.csv --bench --constant left_duty_pct=60
+      gecar import step_*.csv --bench --robot motor.toml --out bench/
+      gecar import sine.csv --bench --command "100*sin(2*pi*t)" --duty-cap 100
+      gecar import serial.txt --column lpwm=left_duty_pct:pwm255 --column rpwm=right_duty_pct:pwm255 --counts 1440
     """
     from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
     from gecar.reality.recordings.importing.meaning import parse_said
@@ -128,16 +157,17 @@ def import_(
     from gecar.world.robot import load_robot
 
     output = Output(as_json)
-    target = out or Path("recordings") / f"{logs[0].stem}.csv"
-    if target.suffix != ".csv":
-        raise expected("--out", f"'{target}'", "a name that ends in .csv")
-    if target.exists() and not force:
-        raise expected(target, "a file that is there", "none, or --force to write over it")
+    if duty_cap is not None and not 1.0 <= duty_cap <= 100.0:
+        raise expected("--duty-cap", duty_cap, "a percentage from 1 to 100")
+    if counts is not None and not 0.0 < counts < math.inf:
+        raise expected("--counts", counts, "a number above 0")
     options = ImportOptions(
         said=parse_said(column or ()),
         names=tuple(name.strip() for name in names.split(",")) if names else (),
         run=run,
-        constant=_constants(constant or ()),
+        commands={**_constants(constant or ()), **_formulas(command or (), bench)},
+        counts=counts,
+        one_clock=one_clock,
         frame=_frame(
             scale,
             y_down,
@@ -150,37 +180,77 @@ def import_(
         ),
         offset_s=_finite("--offset", offset),
     )
-    imported = import_logs(logs, load_robot(robot), _setup(robot, course, bench, program, notes), options)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    write_recording(imported.recording, target)
-    _tell(output, imported, target)
+    if out is not None:
+        _check_ending(out)
+    setup = _setup(robot, course, bench, duty_cap, program, notes)
+    imported = import_logs(logs, load_robot(robot), setup, options)
+    targets = _targets(out, [each.recording.name for each in imported])
+    for target in targets:
+        if target.exists() and not force:
+            raise expected(target, "a file that is there", "none, or --force to write over it")
+    for each, target in zip(imported, targets, strict=True):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_recording(each.recording, target)
+    _tell(output, imported, targets)
 
 
-def _tell(output: Output, imported: Imported, target: Path) -> None:
-    """Say what was guessed, mended and written."""
-    recording, offset = imported.recording, imported.offset
-    for line in imported.guesses:
-        output.print(line)
-    for line in imported.repairs:
-        output.print(line, style="yellow")
-    rows, duration = len(recording.t_s), recording.duration_s
-    output.print(
-        f"Written: {target}, {rows} rows over {duration:.2f} s with {', '.join(recording.measured) or 'commands'}"
-    )
-    output.print_json(
-        {
+def _check_ending(out: Path) -> None:
+    if out.suffix not in ("", ".csv") and not out.is_dir():
+        raise expected("--out", f"'{out}'", "a name that ends in .csv, or a folder")
+
+
+def _targets(out: Path | None, names: Sequence[str]) -> list[Path]:
+    """Return where each recording goes: to the file that was named, numbered if there are several, or into a folder.
+
+    Raises
+    ------
+    InputError
+        If two would go to the same file.
+    """
+    if out is not None and out.suffix == ".csv":
+        if len(names) == 1:
+            return [out]
+        return [out.with_name(f"{out.stem}_{k}.csv") for k in range(1, len(names) + 1)]
+    targets = [(out or Path("recordings")) / f"{name}.csv" for name in names]
+    for target in targets:
+        if targets.count(target) > 1:
+            raise expected(
+                f"--out {out or 'recordings'}", f"several logs named {target.stem}", "--out NAME.csv"
+            )
+    return targets
+
+
+def _tell(output: Output, imported: Sequence[Imported], targets: Sequence[Path]) -> None:
+    """Say what was guessed, mended and written; what holds for all recordings, once."""
+    found = []
+    told: set[str] = set()
+    for each, target in zip(imported, targets, strict=True):
+        recording = each.recording
+        for style, lines in ((None, each.guesses), ("yellow", each.repairs)):
+            for line in lines:
+                if line not in told:
+                    output.print(line, style=style)
+                told.add(line)
+        rows, duration = len(recording.t_s), recording.duration_s
+        output.print(
+            f"Written: {target}, {rows} rows over {duration:.2f} s with {', '.join(recording.measured) or 'commands'}"
+        )
+        found.append({
             "recording": str(target),
             "rows": rows,
             "duration_s": duration,
             "measured": recording.measured,
-            "guesses": imported.guesses,
-            "repairs": imported.repairs,
-            "clock_offset": vars(offset) if offset else None,
-        }
-    )
+            "duty_cap": recording.setup.duty_cap,
+            "guesses": each.guesses,
+            "repairs": each.repairs,
+            "clock_offset": vars(each.offset) if each.offset else None,
+        })  # fmt: skip
+    output.print_json(found[0] if len(found) == 1 else {"recordings": found})
 
 
-def _setup(robot: str, course: str, bench: bool, program: Path | None, notes: str) -> Setup:
+def _setup(
+    robot: str, course: str, bench: bool, duty_cap: float | None, program: Path | None, notes: str
+) -> Setup:
     """Return what goes into the recording's TOML; files of one's own become absolute paths."""
     from gecar.language.program import read_program
     from gecar.reality.recordings.setup import Setup
@@ -190,7 +260,8 @@ def _setup(robot: str, course: str, bench: bool, program: Path | None, notes: st
         load_course(course)
     text = read_program(program).source if program else None
     rig = "bench" if bench else "floor"
-    return Setup(robot=_kept(robot), course=_kept(course), rig=rig, program=text, notes=notes)
+    cap = None if duty_cap is None else duty_cap / 100.0
+    return Setup(robot=_kept(robot), course=_kept(course), rig=rig, duty_cap=cap, program=text, notes=notes)
 
 
 def _kept(name: str) -> str:
@@ -248,7 +319,7 @@ def _pair(option: str, text: str) -> tuple[float, float]:
     return _number(option, parts[0]), _number(option, parts[1])
 
 
-def _constants(texts: Sequence[str]) -> dict[str, float]:
+def _constants(texts: Sequence[str]) -> Commands:
     """Read ``COLUMN=VALUE`` options."""
     from gecar.reality.recordings.columns import COLUMNS
 
@@ -259,5 +330,26 @@ def _constants(texts: Sequence[str]) -> dict[str, float]:
             raise expected(
                 "--constant", f"'{text}'", f"COLUMN=VALUE with one of {', '.join(list(COLUMNS)[1:])}"
             )
-        constants[name] = _number("--constant", value)
+        constants[name] = partial(_constantly, _number("--constant", value))
     return constants
+
+
+def _constantly(value: float, t_s: Series) -> Series:
+    return 0.0 * t_s + value
+
+
+def _formulas(texts: Sequence[str], bench: bool) -> Commands:
+    """Read ``[COLUMN=]FORMULA`` options; without a column it is the left motor's on a bench, both motors' elsewhere."""
+    from gecar.reality.recordings.importing.command_formula import command_of
+    from gecar.reality.recordings.importing.log import DUTIES
+
+    formulas = {}
+    for text in texts:
+        name, equals, formula = text.partition("=")
+        if equals and name.strip().isidentifier() and not formula.startswith("="):
+            if name.strip() not in DUTIES:
+                raise expected("--command", f"the column '{name.strip()}'", " or ".join(DUTIES))
+            formulas[name.strip()] = command_of(formula)
+        else:
+            formulas |= dict.fromkeys(DUTIES[:1] if bench else DUTIES, command_of(text))
+    return formulas

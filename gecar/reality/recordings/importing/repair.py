@@ -9,11 +9,9 @@ import numpy.typing as npt
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import Series
+from gecar.reality.recordings.encoder_zero import FASTEST_DPS
 
-# An EV3 large motor turns at most 1050 deg/s at 9 V (Pybricks motor data); half as much again, and a few
-# degrees for times that are whole milliseconds, is a jump.
-_FASTEST_DPS = 1600.0
-_SLACK_DEG = 25.0
+_SLACK_DEG = 25.0  # beyond what the fastest wheel turns: times are whole milliseconds
 _WRAPS_DEG = (360.0, 65536.0, 32768.0, 4294967296.0)
 _LONGEST_SPIKE = 3
 _MOST_DROPPED = 0.2
@@ -25,8 +23,7 @@ Rows = npt.NDArray[np.bool_]
 def increasing_rows(where: str, time: Series) -> tuple[Rows, list[str]]:
     """Choose the rows whose times increase.
 
-    Times that repeat keep the last row (it holds the newest command); a clock that starts again keeps the
-    longer run; single rows out of order go.
+    Times that repeat keep the last row (it holds the newest command); single rows out of order go.
 
     Parameters
     ----------
@@ -45,17 +42,21 @@ def increasing_rows(where: str, time: Series) -> tuple[Rows, list[str]]:
     Raises
     ------
     InputError
-        If a fifth of the rows would have to go.
+        If a fifth of the rows is out of order, or half of them repeat a time.
     """
     repairs = []
     keep = ~np.isnan(time)
     if not keep.all():
         repairs.append(f"{where}: left out {int((~keep).sum())} rows without a time")
-    keep, line = _longest_run(where, time, keep)
-    repairs += line
+    counted = int(keep.sum())
     repeated = np.zeros_like(keep)
     kept = np.flatnonzero(keep)
     repeated[kept[:-1]] = time[kept[:-1]] == time[kept[1:]]
+    if 2 * repeated.sum() > counted:
+        raise InputError(
+            f"{where}: {int(repeated.sum())} of {counted} rows repeat the time of the next: its clock is too coarse "
+            "(is another column the time? --column NAME=t_s)"
+        )
     if repeated.any():
         repairs.append(f"{where}: left out {int(repeated.sum())} rows whose time the next row repeats")
     keep &= ~repeated
@@ -71,20 +72,11 @@ def increasing_rows(where: str, time: Series) -> tuple[Rows, list[str]]:
     return ordered, repairs
 
 
-def _longest_run(where: str, time: Series, keep: Rows) -> tuple[Rows, list[str]]:
-    """Keep the longest stretch between restarts of the clock."""
-    rows = np.flatnonzero(keep)
+def clock_restarts(time: Series) -> list[int]:
+    """Return the rows at which the clock starts again; times may be blank (NaN), shape (rows,)."""
+    rows = np.flatnonzero(~np.isnan(time))
     values = time[rows]
-    restarts = [k + 1 for k in np.flatnonzero(np.diff(values) < 0.0) if _restarts(values, int(k) + 1)]
-    if not restarts:
-        return keep, []
-    edges = np.array([0, *restarts, len(rows)])
-    sizes = np.diff(edges)
-    best = int(sizes.argmax())
-    chosen = np.zeros_like(keep)
-    chosen[rows[edges[best] : edges[best + 1]]] = True
-    listed = ", ".join(str(size) for size in sizes)
-    return chosen, [f"{where}: the clock starts again (stretches of {listed} rows): took the longest"]
+    return [int(rows[k + 1]) for k in np.flatnonzero(np.diff(values) < 0.0) if _restarts(values, int(k) + 1)]
 
 
 def _restarts(values: Series, k: int) -> bool:
@@ -165,7 +157,7 @@ def _first_jump(t_s: Series, angle: Series) -> tuple[int, int] | None:
 
 
 def _reach(step_s: Series) -> Series:
-    return _FASTEST_DPS * np.minimum(step_s, 1.0) + _SLACK_DEG
+    return FASTEST_DPS * np.minimum(step_s, 1.0) + _SLACK_DEG
 
 
 def _mend_jump(t_s: Series, angle: Series, logged: Series, before: int, after: int) -> str | None:
