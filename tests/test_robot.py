@@ -79,6 +79,22 @@ def test_a_centre_of_mass_that_is_not_between_axle_and_caster_is_refused(tmp_pat
     assert all(0.0 <= place / caster < 1.0 for place in standing)
 
 
+MOTOR_ALONE = (
+    "name = 'motor'\n[motor]\ntorque_constant = 35.0\nback_emf_constant = 0.0\nresistance = 1.0\ninertia = 95.0\n"
+    "coulomb_friction = 0.0\n[battery]\nvoltage = 10.0\n[drive]\nduty_cap = 1.0\n"
+)
+
+
+def test_a_motor_alone_borrows_the_ev3s_body(tmp_path):
+    path = tmp_path / "motor.toml"
+    path.write_text(MOTOR_ALONE)
+    robot = load_robot(path)
+    assert (robot.name, robot.motor.inertia, robot.body) == ("motor", 95.0, EV3.body)
+    path.write_text(MOTOR_ALONE + "[tyre]\nfriction = 1.0\n")
+    with pytest.raises(InputError, match="body: found nothing"):
+        load_robot(path)
+
+
 def test_unknown_robot_is_refused():
     with pytest.raises(InputError, match="'ev4'"):
         load_robot("ev4")

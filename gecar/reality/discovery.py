@@ -30,7 +30,6 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
-from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
@@ -47,7 +46,7 @@ from gecar.reality.uncertainty.limits import limits
 from gecar.reality.verdict import Found, Interval, Judgement, Limit, Minor, Misfit, Residual, Verdict
 from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE, Effect
-from gecar.world.robot import Robot
+from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Outcome, World, simulate
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
@@ -119,7 +118,7 @@ def discover(
     InputError
         If a name is unknown, or a robot or course file is wrong.
     """
-    known = robot if robot is not None else known_robot(case.recordings[0])
+    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
     context = _Context(
         known, tuple(catalogue), hold_out(case, holdout), seed, tell, with_formula, material, program
     )

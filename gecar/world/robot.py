@@ -21,6 +21,7 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Percent = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 _SHIPPED = Path(__file__).parent
+LEAST_BACK_EMF = 1e-9  # V s/rad: a drive that has none, controlled in current
 
 
 class _Section(BaseModel):
@@ -210,12 +211,27 @@ def robot_from(table: Mapping[str, Any], where: str | Path) -> Robot:
 def read_robot(path: Path) -> Robot:
     """Read a robot file (TOML, SI units).
 
+    A file of a motor alone, as for a bench, has neither body nor tyre nor colour sensor: those of the EV3 stand in.
+
     Raises
     ------
     InputError
         If the file is missing, not TOML, or a field is wrong.
     """
-    return robot_from(read_toml(path, "a robot file"), path)
+    table = read_toml(path, "a robot file")
+    if not {"body", "tyre", "colour_sensor"} & table.keys() and "motor" in table:
+        table = _with_body(table)
+    return robot_from(table, path)
+
+
+def _with_body(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Add the EV3's body, tyre and sensor to a motor alone; in current control it has hardly any back-EMF."""
+    nominal = read_robot(_SHIPPED / "ev3.toml").model_dump(include={"body", "tyre", "colour_sensor"})
+    whole = nominal | dict(table)
+    motor = whole["motor"]
+    if isinstance(motor, dict):
+        whole["motor"] = motor | {"back_emf_constant": motor.get("back_emf_constant") or LEAST_BACK_EMF}
+    return whole
 
 
 def list_robots() -> list[str]:

@@ -18,7 +18,6 @@ from gecar.language.grammar import read_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import Program, mirrored, parse_program, read_program
 from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
-from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Recording, read_recording, write_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.results.checkpoint import unpack
@@ -69,15 +68,20 @@ def recording(raw: bytes, folder: Path) -> None:
     for name, part in zip(("run.csv", "run.toml", "robot.toml"), parts, strict=True):
         _file(folder, name, part)
     read = read_recording(folder / "run.csv")
-    known_robot(read)
+    load_robot(read.setup.robot)
     _must(_reads_back(read, folder), "a recording as it is written reads back")
 
 
 def log(raw: bytes, folder: Path) -> None:
     """Import one log or more, write the recordings, and read them as strictly as any."""
-    paths = [_file(folder, f"file{k}.txt", part) for k, part in enumerate(raw.split(PARTED, 2))]
+    paths = [_file(folder, f"file{k}{_ending(part)}", part) for k, part in enumerate(raw.split(PARTED, 2))]
     for imported in import_logs(paths, _ev3(), Setup(rig="bench"), ImportOptions()):
         _must(_reads_back(imported.recording, folder), "what was imported is a recording")
+
+
+def _ending(raw: bytes) -> str:
+    """Return the ending of what a log's content looks like: the reader goes by it."""
+    return ".mat" if raw.startswith(b"MATLAB") else ".xlsx" if raw.startswith(b"PK") else ".txt"
 
 
 def run(raw: bytes, folder: Path) -> None:
@@ -129,7 +133,8 @@ WORDS = {
     "picture": "IHDR IDAT IEND PLTE tRNS iCCP zTXt GIF89a BM II* P5 P6 P2 RIFF JFIF",
     "recording": "t_s, left_duty_pct right_duty_pct left_angle_deg reflection_pct x_m heading_deg battery_v rig= "
     'course= robot="robot.toml" program= duty_cap= [noise] ===== 1e308 -1e-320 ,, [motor] [battery] [drive]',
-    "log": "t_s ms time left right duty angle x y heading deg rad nan ; , \t # ===== 1e308 -1 0.01 reflection DataLog",
+    "log": "t_s ms time left right duty angle x y heading deg rad nan ; , \t # ===== 1e308 -1 0.01 reflection DataLog "
+    "pwm enc speed mm/s rpm trial %time field.header.stamp.nsecs orientation.z 12:30:01.020 2026-11-21T12:00:00 left:1",
     "run": "config.toml checkpoint history.csv result.json study.json fitness.toml robot.toml fitness_s {} [] null NaN "
     "1e999 [[drive]] [[search]] seeds= program= [search] population= genomes rows codons n_arrivals -1 [effects. seed=",
 }

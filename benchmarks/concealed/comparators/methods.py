@@ -19,7 +19,6 @@ from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import cost
-from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.replay.replayer import Replayer, replayer_of
 from gecar.reality.residuals import of_case
@@ -31,6 +30,7 @@ from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import MOST_EFFECTS
 from gecar.reality.uncertainty.intervals import NORMAL_95, deviations
 from gecar.reality.verdict import NextRecording
+from gecar.world.robot import load_robot
 
 Array = npt.NDArray[np.float64]
 
@@ -166,7 +166,7 @@ class OpenLoop(RecordingResiduals):
 def open_loop_residuals_of(*parts: Any) -> RecordingResiduals:
     """Set a recording beside its open-loop simulation."""
     beside = residuals_of(*parts)
-    known = known_robot(beside.recording).physics
+    known = load_robot(beside.recording.setup.robot).physics
     start = replayer_of(beside.recording, beside.noise.sd).aligned_start(known, START_S)
     return OpenLoop(**vars(beside), open_start=start)
 

@@ -20,7 +20,6 @@ from gecar.reality.discovery import MEMORY_S
 from gecar.reality.fitting.parameters import Coordinate, free
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.holdout import Contender, judge
-from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import hold_out
 from gecar.reality.residuals.of_case import motion_residuals
@@ -29,7 +28,7 @@ from gecar.reality.residuals.threads import Threads
 from gecar.reality.uncertainty.intervals import NORMAL_95
 from gecar.reality.verdict import Interval, Judgement
 from gecar.world.effects import CATALOGUE
-from gecar.world.robot import Robot
+from gecar.world.robot import Robot, load_robot
 
 Array = npt.NDArray[np.float64]
 Terms = dict[str, Array]  # by the parameter's field: what one SI unit of it adds to the left side
@@ -50,7 +49,7 @@ TORQUE_NM, SPEED_M_S, TURN_RAD_S, READING_PCT = 0.02, 0.01, 0.1, 3.0
 def sparse_regression(case: Case, holdout: Sequence[str]) -> dict[str, Any]:
     """Return a verdict in the form of ``verdict.json``."""
     parts = hold_out(case, holdout)
-    robot = known_robot(parts.fitted[0])
+    robot = load_robot(parts.fitted[0].setup.robot)
     noise = estimate_noise(parts.fitted, robot.physics, MEMORY_S)
     known = {c.parameter.field: c for e in CATALOGUE for c in free(robot, [e.id]).coordinates}
     fitted, held = (

@@ -12,7 +12,8 @@ from gecar.cli.output import JsonOption, Output
 
 def calibrate(
     case: Annotated[
-        Path, typer.Argument(metavar="CASE", show_default=False, help="A folder of recordings of one robot.")
+        Path, typer.Argument(metavar="CASE", show_default=False,
+                             help="A folder of recordings of one robot; or one recording.")
     ],
     out: Annotated[
         Path, typer.Option("--out", metavar="FOLDER", help="Folder for robot.toml, calibration.json and the picture.")

@@ -16,7 +16,8 @@ from gecar.reality.materiality import DEFAULT, Material
 def discover(
     cases: Annotated[
         list[Path],
-        typer.Argument(metavar="CASE...", show_default=False, help="Folders, each with recordings of one robot."),
+        typer.Argument(metavar="CASE...", show_default=False,
+                       help="Folders, each with recordings of one robot; or a recording."),
     ],
     out: Annotated[
         Path,

@@ -29,13 +29,12 @@ from gecar.reality.calibrate.identifiability import BLIND, at_bounds, identifiab
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.camera_frame import corrected
-from gecar.reality.recordings.known_robot import known_robot
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.verdict import VISIBLE, Misfit
-from gecar.world.robot import Robot
+from gecar.world.robot import Robot, load_robot
 
 Array = npt.NDArray[np.float64]
 
@@ -154,7 +153,7 @@ def calibrate(
         If a name is unknown, or a robot or course file is wrong.
     """
     constants, parts = chosen(names), hold_out(case, holdout)
-    known = robot if robot is not None else known_robot(case.recordings[0])
+    known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
     noise = estimate_noise(parts.fitted, known.physics, MEMORY_S)
     tell(f"fitting on {', '.join(r.name for r in parts.fitted)}")
     with Threads() as threads:

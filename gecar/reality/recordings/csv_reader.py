@@ -52,9 +52,7 @@ def _lines(path: Path) -> list[str]:
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise expected(
-            path, f"bytes that are not UTF-8 at {error.start}", "a recording as UTF-8 text"
-        ) from None
+        raise _no_recording(path, f"{path}: found bytes that are not UTF-8 at {error.start}") from None
     except OSError as error:
         raise expected(path, error.strerror or "an unreadable file", "a recording (.csv)") from None
     lines = text.replace("\r\n", "\n").rstrip("\n").split("\n")
@@ -68,6 +66,8 @@ def _lines(path: Path) -> list[str]:
 def _header(path: Path, line: str) -> tuple[list[str], list[str]]:
     """Return the column names, and a warning for each column that means nothing here."""
     names = [name.strip() for name in line.split(",")]
+    if "t_s" not in names and not difflib.get_close_matches("t_s", names, 1, 0.75):
+        raise _no_recording(path, f"{path}, line 1: found {_short(line)}")
     warnings = []
     for k, name in enumerate(names):
         where = f"{path}, line 1, column {k + 1}"
@@ -79,6 +79,17 @@ def _header(path: Path, line: str) -> tuple[list[str], list[str]]:
                 raise expected(where, repr(name), repr(near[0]))
             warnings.append(f"{path}: the column {name!r} is not one of {', '.join(COLUMNS)}: passed over")
     return names, warnings
+
+
+def _no_recording(path: Path, found: str) -> InputError:
+    """Return the error for a file that is a log, but no recording: with what makes one of it."""
+    return InputError(
+        f"{found}, expected a recording's columns (t_s, left_duty_pct, ...): first gecar import {path}"
+    )
+
+
+def _short(line: str) -> str:
+    return repr(line if len(line) <= 60 else f"{line[:57]}...")
 
 
 def _blocks(path: Path, lines: list[str], names: list[str]) -> Iterator[Series]:

@@ -19,6 +19,7 @@ from gecar.reality.recordings.csv_reader import read_table
 from gecar.reality.recordings.encoder_zero import encoder_zero
 from gecar.reality.recordings.setup import Setup, read_setup, setup_toml
 
+LOGS = (".txt", ".log", ".dat", ".tsv", ".mat", ".xlsx")
 ANGLES = ("left_angle_deg", "right_angle_deg")
 LONGEST_S = 36_000.0  # a replay simulates every millisecond between two rows, however few there are
 
@@ -136,25 +137,37 @@ def read_recording(csv_path: Path | str) -> Recording:
     return replace(recording, name=path.stem)
 
 
-def read_case(folder: Path | str) -> Case:
-    """Read every CSV file of a folder, by name.
+def read_case(place: Path | str) -> Case:
+    """Read every CSV file of a folder, by name; or one recording alone.
 
     Raises
     ------
     InputError
         If there is none, if one cannot be read, or if they are of different robots.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise expected(folder, "no such folder", "a folder of recordings")
-    files = sorted(folder.glob("*.csv"))
+    place = Path(place)
+    if place.is_file():
+        return Case(place.stem, (read_recording(place),))
+    if not place.is_dir():
+        raise expected(place, "no such folder", "a folder of recordings")
+    files = sorted(place.glob("*.csv"))
     if not files:
-        raise expected(folder, "no .csv file", "recordings of one robot")
+        raise expected(place, _found_instead(place), "recordings of one robot")
     recordings = tuple(read_recording(file) for file in files)
     robots = sorted({recording.setup.robot for recording in recordings})
     if len(robots) > 1:
-        raise expected(folder, f"recordings of the robots {' and '.join(robots)}", "recordings of one robot")
-    return Case(folder.resolve().name, recordings)
+        raise expected(place, f"recordings of the robots {' and '.join(robots)}", "recordings of one robot")
+    return Case(place.resolve().name, recordings)
+
+
+def _found_instead(folder: Path) -> str:
+    """Say what a folder without recordings holds, and what to do with logs in it."""
+    logs = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in LOGS)
+    if not logs:
+        return "no .csv file"
+    return (
+        f"no .csv file but {', '.join(logs[:3])} (first gecar import {folder / ('*' + Path(logs[0]).suffix)})"
+    )
 
 
 def write_recording(recording: Recording, csv_path: Path | str) -> None:

@@ -98,6 +98,8 @@ class _Reading:
         self.starts_s = 0.0
         most = np.nanmax(np.abs(table.values), axis=0, initial=0.0)
         found = guess_meanings(table.names, most.tolist(), said)
+        filled = [not np.isnan(table.values[:, k]).all() for k in range(len(found))]
+        found = tuple(m if some else Meaning(m.name, None) for m, some in zip(found, filled, strict=True))
         for k, meaning in enumerate(found):
             if meaning.column:
                 self.meanings[meaning.column] = meaning

@@ -211,7 +211,8 @@ def encoder_unit(t_s: Series, angle: Series, duty_pct: Series, machine: Machine)
     """
     seen = ~np.isnan(angle)
     t_s, angle, duty_pct = t_s[seen], angle[seen], duty_pct[seen]
-    speeds, driven = np.abs(np.diff(angle) / np.diff(t_s)), np.abs(duty_pct[:-1]) >= 15.0
+    with np.errstate(over="ignore"):
+        speeds, driven = np.abs(np.diff(angle) / np.diff(t_s)), np.abs(duty_pct[:-1]) >= 15.0
     if driven.sum() < 10 or not speeds[driven].any():
         return None, NO_DRIVE
     rate = float(np.mean(speeds[driven]) / np.mean(np.abs(duty_pct[:-1][driven])))
