@@ -1,4 +1,5 @@
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,9 +7,14 @@ from PIL import Image
 from trials import ARRIVES, trial, weak_robot, write_trials
 
 from gecar.language.program import parse_program
+from gecar.plots.reality.bench import bench_figure
 from gecar.plots.reality.gap import gap_figure
 from gecar.plots.style import is_whole
+from gecar.reality.compare.bench import bench_gap
 from gecar.reality.compare.gap import Path, arrival_of, gap, nrmse, recorded_path
+from gecar.reality.recordings.recording import make_recording, read_case, write_recording
+from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.replayer import replay
 from gecar.report.gap import gap_csv, gap_markdown, mean_and_spread, spread
 from gecar.results.arrival import percent
 from gecar.world.course.course import load_course
@@ -130,6 +136,39 @@ def test_a_rehearsed_drive_is_a_recording_without_a_gap(gecar, tmp_path):
     assert ended.json["trials"][0]["largest_displacement_m"] < 0.01
 
 
+def bench_case(folder, voltage=8.0, levels=(40, 80, 100)):
+    """Write steps of a motor that the nominal one would be at another voltage."""
+    folder.mkdir()
+    strong = ROBOT.model_copy(update={"battery": ROBOT.battery.model_copy(update={"voltage": voltage})})
+    for level in levels:
+        t = np.arange(0.0, 2.0, 0.01)
+        columns = {"t_s": t, "left_duty_pct": np.full(len(t), float(level)), "left_angle_deg": 0.0 * t}
+        recording = make_recording(f"step_{level:03d}", columns, Setup(rig="bench", duty_cap=1.0))
+        angle = replace(recording, left_angle_rad=replay(recording, strong).left_angle_rad)
+        write_recording(angle, folder / f"step_{level:03d}.csv")
+    return folder
+
+
+def test_a_bench_is_compared_shaft_by_shaft(gecar, tmp_path):
+    bench_case(tmp_path / "case", ROBOT.battery.voltage * 1.1)
+    found = gecar("compare", "case", "--json").json
+    assert [row["duty_pct"] for row in found["trials"]] == [40.0, 80.0, 100.0]
+    for row in found["trials"]:
+        assert row["simulated_speed_dps"] / row["speed_dps"] == pytest.approx(1 / 1.1, abs=0.02)
+        assert row["end_deg"] < -50.0
+    with Image.open(tmp_path / "compared/compare.png") as picture:
+        assert picture.width > 1000
+    assert len((tmp_path / "compared/compare.csv").read_text().splitlines()) == 4
+    assert "| step_040 | 40 |" in (tmp_path / "compared/compare.md").read_text()
+
+
+def test_a_bench_of_the_simulated_motor_has_no_gap(tmp_path):
+    recordings = read_case(bench_case(tmp_path / "case", ROBOT.battery.voltage)).recordings
+    found = bench_gap(recordings, ROBOT)
+    assert max(shaft.rms_deg for shaft in found.shafts) < 0.01
+    assert is_whole(bench_figure(found, "title", "detail"))
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [
@@ -137,7 +176,8 @@ def test_a_rehearsed_drive_is_a_recording_without_a_gap(gecar, tmp_path):
         (("trials", "--frame", "moon"), "--frame"),
         (("trials", "--program", "nowhere.txt"), "nowhere.txt"),
         (("trials", "--course", "none"), "--course"),
-        (("bench.csv",), "bench"),
+        (("bench.csv",), "shaft's angle"),
+        (("bench.csv", "trials"), "some from a bench and some from the floor"),
         (("blind.csv",), "angles"),
     ],
 )

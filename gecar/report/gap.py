@@ -202,7 +202,7 @@ def _times(found: Gap) -> str:
     if arrived:
         times, errors = [t.arrival_s for t in arrived], [t.error_pct for t in arrived]
         rows.append(("mean ± sd", mean_and_spread(times, 2), mean_and_spread(errors, 1)))
-    return _grid(("Experiment", "Arrival time (s)", "Error (%)"), rows)
+    return grid(("Experiment", "Arrival time (s)", "Error (%)"), rows)
 
 
 def _percent(value: float) -> str:
@@ -212,7 +212,7 @@ def _percent(value: float) -> str:
 def _correlations(found: Gap) -> str:
     rows = [(t.name, *(mean_and_spread([c], 4) for c in t.correlation)) for t in found.trials]
     rows.append(("mean ± sd", _pair(found, 0), _pair(found, 1)))
-    return _grid(("Experiment", "x-coordinate", "y-coordinate"), rows)
+    return grid(("Experiment", "x-coordinate", "y-coordinate"), rows)
 
 
 def _misfits(found: Gap) -> str:
@@ -223,13 +223,14 @@ def _misfits(found: Gap) -> str:
         (c, _over([t.closed_loop for t in found.trials], c), _over([t.open_loop for t in found.trials], c))
         for c in columns
     ]
-    return _grid(("Channel", "closed loop", "open loop, recorded commands"), rows)
+    return grid(("Channel", "closed loop", "open loop, recorded commands"), rows)
 
 
 def _over(misfits: Sequence[Mapping[str, float]], column: str) -> str:
     return mean_and_spread([m[column] for m in misfits if column in m], 4)
 
 
-def _grid(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def grid(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as Markdown: the first column to the left, numbers to the right."""
     lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)

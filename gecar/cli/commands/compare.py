@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +14,6 @@ from gecar.errors import expected
 
 if TYPE_CHECKING:
     from gecar.language.program import Program
-    from gecar.reality.compare.gap import Gap
     from gecar.reality.recordings.recording import Recording
 
 FRAMES = ("start", "course")
@@ -26,7 +25,7 @@ def compare(
     recordings: Annotated[
         list[Path],
         typer.Argument(metavar="RECORDING", show_default=False,
-                       help="Recordings (.csv) of one program, or folders of them."),
+                       help="Recordings (.csv) of one program, or from a bench, or folders of them."),
     ],
     program: Annotated[
         Path | None,
@@ -48,13 +47,15 @@ def compare(
 ) -> None:  # fmt: skip
     """Compare simulation and recordings: arrival times, paths, displacement, correlation, misfit of each channel.
 
+    Of recordings from a bench: how far simulated shafts turn beside the measured ones, and how fast.
+
     [bold]Examples[/]
 
       gecar compare trials/ --program runs/evolve-001
       gecar compare trial_1.csv trial_2.csv --program best.txt --robot calibrated/robot.toml
     """
     from gecar.reality.compare.gap import gap
-    from gecar.report.gap import gap_lines, gap_table
+    from gecar.report.gap import gap_csv, gap_detail, gap_lines, gap_markdown, gap_table, gap_title
     from gecar.results.arrival import arrives
     from gecar.world.course.course import load_course
     from gecar.world.robot import load_robot
@@ -64,6 +65,9 @@ def compare(
         raise expected("--frame", repr(frame), " or ".join(FRAMES))
     output = Output(as_json)
     trials = _read(recordings)
+    if trials[0].setup.rig == "bench":
+        _compare_bench(output, trials, robot, program, out, not no_picture)
+        return
     driven = _program(program, trials)
     place = course or trials[0].setup.course
     if driven is not None and place == "none":
@@ -75,24 +79,67 @@ def compare(
         found = replace(found, arrives=arrives(World(driver, where), driven, SEED))
     for line in gap_lines(found):
         output.print(line)
-    written = _write(found, out, not no_picture)
+    written = _write(out, gap_markdown(found), gap_csv(found), gap_table(found))
+    if not no_picture:
+        from gecar.plots.reality.gap import gap_figure
+        from gecar.plots.style import save
+
+        written["png"] = str(
+            save(gap_figure(found, gap_title(found), gap_detail(found)), out / "compare.png")
+        )
     output.print(f"Written: {', '.join(written.values())}")
     output.print_json({**gap_table(found), "written": written})
 
 
+def _compare_bench(
+    output: Output, trials: list[Recording], robot: str | None, program: Path | None, out: Path, picture: bool
+) -> None:
+    """Set simulated shafts beside those of a bench."""
+    from gecar.reality.compare.bench import bench_gap
+    from gecar.report.bench import (
+        bench_csv,
+        bench_detail,
+        bench_lines,
+        bench_markdown,
+        bench_table,
+        bench_title,
+    )
+    from gecar.world.robot import load_robot
+
+    if program is not None:
+        raise expected("--program", "recordings from a bench", "recordings of a program on the floor")
+    found = bench_gap(trials, load_robot(robot or trials[0].setup.robot))
+    for line in bench_lines(found):
+        output.print(line)
+    written = _write(out, bench_markdown(found), bench_csv(found), bench_table(found))
+    if picture:
+        from gecar.plots.reality.bench import bench_figure
+        from gecar.plots.style import save
+
+        written["png"] = str(
+            save(bench_figure(found, bench_title(found), bench_detail(found)), out / "compare.png")
+        )
+    output.print(f"Written: {', '.join(written.values())}")
+    output.print_json({**bench_table(found), "written": written})
+
+
 def _read(places: list[Path]) -> list[Recording]:
-    """Read recordings, and folders of them; they must have a motion on the floor to compare."""
+    """Read recordings, and folders of them: all of a bench or all of the floor, and with a motion to compare."""
     from gecar.reality.recordings.recording import read_case, read_recording
 
     found: list[Recording] = []
     for place in places:
         found += read_case(place).recordings if place.is_dir() else (read_recording(place),)
+    rigs = {recording.setup.rig for recording in found}
+    if len(rigs) > 1:
+        raise expected(
+            "the recordings", "some from a bench and some from the floor", "recordings of one kind"
+        )
     for recording in found:
-        if recording.setup.rig != "floor":
-            raise expected(recording.name, "a recording from a bench", "one of a robot on the floor")
-        if not {"x_m", "y_m"} <= set(recording.measured) and not {"left_angle_rad", "right_angle_rad"} <= set(
-            recording.measured
-        ):
+        measured, angles = set(recording.measured), {"left_angle_rad", "right_angle_rad"}
+        if recording.setup.rig == "bench" and not measured & angles:
+            raise expected(recording.name, "no shaft's angle", "left_angle_deg or right_angle_deg")
+        if recording.setup.rig == "floor" and not ({"x_m", "y_m"} <= measured or angles <= measured):
             raise expected(
                 recording.name, "neither a pose nor both wheels' angles", "one of them, for the path"
             )
@@ -113,25 +160,11 @@ def _program(place: Path | None, trials: list[Recording]) -> Program | None:
     return parse_program(text, f"{trials[0].name}, program") if text else None
 
 
-def _write(found: Gap, out: Path, picture: bool) -> dict[str, str]:
-    """Write the tables and the picture; return where."""
+def _write(out: Path, markdown: str, rows: str, table: dict[str, Any]) -> dict[str, str]:
+    """Write the tables; return where."""
     from gecar.files import json_text, write_whole
-    from gecar.report.gap import gap_csv, gap_markdown, gap_table
 
     out.mkdir(parents=True, exist_ok=True)
-    for ending, text in (
-        ("md", gap_markdown(found)),
-        ("csv", gap_csv(found)),
-        ("json", json_text(gap_table(found))),
-    ):
-        write_whole(out / f"compare.{ending}", text)
-    written = {kind: str(out / f"compare.{kind}") for kind in ("md", "csv", "json")}
-    if picture:
-        from gecar.plots.reality.gap import gap_figure
-        from gecar.plots.style import save
-        from gecar.report.gap import gap_detail, gap_title
-
-        written["png"] = str(
-            save(gap_figure(found, gap_title(found), gap_detail(found)), out / "compare.png")
-        )
-    return written
+    for ending, content in (("md", markdown), ("csv", rows), ("json", json_text(table))):
+        write_whole(out / f"compare.{ending}", content)
+    return {kind: str(out / f"compare.{kind}") for kind in ("md", "csv", "json")}

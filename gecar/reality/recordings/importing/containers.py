@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from gecar.reality.recordings.importing.text_tables import tables_in_lines
 
 MOST_UNPACKED = 256 * 1024 * 1024  # bytes; both kinds are packed, so that a small file may hold a large one
 MOST_DEPTH = 20  # structures within each other
+_TRY = "import sys; from scipy.io import loadmat; loadmat(sys.argv[1], simplify_cells=True)"
+_LONGEST_TRY_S = 60.0
 _MAT_HEADER, _MAT_COMPRESSED = 128, 15
 
 Matrix = npt.NDArray[np.float64]
@@ -58,13 +60,15 @@ def read_mat(path: Path) -> list[ForeignTable]:
 
 
 def _loaded(path: Path) -> dict[str, Any]:
-    """Let SciPy read a file, in a process of its own: on damaged files its compiled reader may end the process."""
+    """Read a file with SciPy, first in a process apart: a damaged file can make its compiled reader crash."""
     try:
-        with ProcessPoolExecutor(1, get_context("spawn")) as apart:
-            found: dict[str, Any] = apart.submit(loadmat, path, simplify_cells=True).result()
-    except Exception as error:  # noqa: BLE001  the reader raises whatever its parts do
-        found_instead = f"no MATLAB file, or a damaged one ({type(error).__name__})"
-        raise expected(path, found_instead, "a .mat file of version 7") from None
+        command = [sys.executable, "-c", _TRY, str(path)]
+        tried = subprocess.run(command, capture_output=True, timeout=_LONGEST_TRY_S, check=False)  # noqa: S603
+    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+        raise expected(path, f"a file that can not be read ({error})", "a .mat file") from None
+    if tried.returncode != 0:
+        raise expected(path, "no MATLAB file, or a damaged one", "a .mat file of version 7 or earlier")
+    found: dict[str, Any] = loadmat(path, simplify_cells=True)
     return found
 
 
