@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gecar.errors import expected
 from gecar.language.program import Program
 from gecar.results.config import Config, configure, read_config
 from gecar.search.programs import noise_seed
 from gecar.world.course.course import load_course
-from gecar.world.robot import load_robot
+from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Noise, World
+
+if TYPE_CHECKING:
+    from gecar.reality.recordings.recording import Recording
 
 _OF_A_WORLD = ("course", "robot", "time_limit_s", "step_s", "engine", "noise", "motor_noise", "seed")
 
@@ -82,3 +86,11 @@ def drive_seed(given: int | None, settings: dict[str, Any], program: Program) ->
     if given is not None:
         return given
     return noise_seed(settings["seed"], program) if settings else 1
+
+
+def warnings_of(recordings: Sequence[Recording], robot: Robot) -> list[str]:
+    """Return what was passed over in reading recordings, and whether a cap on duty surely did not hold."""
+    from gecar.reality.recordings.duty_cap import cap_warning
+
+    found = dict.fromkeys(line for recording in recordings for line in recording.warnings)
+    return [line for line in (*found, cap_warning(recordings, robot)) if line]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 import typer
@@ -38,6 +38,11 @@ class Output:
             self.console.print(words, style=style, markup=False, soft_wrap=True)
         else:
             self.console.print(words)
+
+    def warn(self, lines: Iterable[str]) -> None:
+        """Print warnings, a line each."""
+        for line in lines:
+            self.print(f"warning: {line}", style="yellow")
 
     def print_json(self, table: Mapping[str, Any]) -> None:
         """Print a command's JSON object, if that is what is wanted."""

@@ -43,6 +43,7 @@ def calibrate(
       gecar calibrate recordings/bench --holdout step_040,step_080 --json
       gecar evolve --robot calibrated/robot.toml
     """
+    from gecar.cli.inputs import warnings_of
     from gecar.files import json_text, write_whole
     from gecar.reality.calibrate.calibration import calibrate as calibrate_case
     from gecar.reality.recordings.recording import read_case
@@ -50,10 +51,13 @@ def calibrate(
     from gecar.world.robot import load_robot, write_robot
 
     output = Output(as_json)
+    recorded = read_case(case)
+    known = load_robot(robot or recorded.recordings[0].setup.robot)
+    output.warn(warnings_of(recorded.recordings, known))
     result = calibrate_case(
-        read_case(case),
+        recorded,
         _names(holdout),
-        load_robot(robot) if robot else None,
+        known,
         _names(constants),
         lambda line: output.print(f"  {line}", style="dim"),
     )

@@ -15,6 +15,7 @@ from gecar.errors import expected
 if TYPE_CHECKING:
     from gecar.language.program import Program
     from gecar.reality.recordings.recording import Recording
+    from gecar.world.robot import Robot
 
 FRAMES = ("start", "course")
 SEED = 1
@@ -54,6 +55,7 @@ def compare(
       gecar compare trials/ --program runs/evolve-001
       gecar compare trial_1.csv trial_2.csv --program best.txt --robot calibrated/robot.toml
     """
+    from gecar.cli.inputs import warnings_of
     from gecar.reality.compare.gap import gap
     from gecar.report.gap import gap_csv, gap_detail, gap_lines, gap_markdown, gap_table, gap_title
     from gecar.results.arrival import arrives
@@ -65,15 +67,16 @@ def compare(
         raise expected("--frame", repr(frame), " or ".join(FRAMES))
     output = Output(as_json)
     trials = _read(recordings)
+    driver = load_robot(robot or trials[0].setup.robot)
+    output.warn(warnings_of(trials, driver))
     if trials[0].setup.rig == "bench":
-        _compare_bench(output, trials, robot, program, out, not no_picture)
+        _compare_bench(output, trials, driver, program, out, not no_picture)
         return
     driven = _program(program, trials)
     place = course or trials[0].setup.course
     if driven is not None and place == "none":
         raise expected("--course", "none, a blank floor", "the course the program drove on")
     where = None if place == "none" else load_course(place)
-    driver = load_robot(robot or trials[0].setup.robot)
     found = gap(trials, driver, where, driven, frame == "course")
     if driven is not None and where is not None:
         found = replace(found, arrives=arrives(World(driver, where), driven, SEED))
@@ -92,7 +95,7 @@ def compare(
 
 
 def _compare_bench(
-    output: Output, trials: list[Recording], robot: str | None, program: Path | None, out: Path, picture: bool
+    output: Output, trials: list[Recording], robot: Robot, program: Path | None, out: Path, picture: bool
 ) -> None:
     """Set simulated shafts beside those of a bench."""
     from gecar.reality.compare.bench import bench_gap
@@ -104,11 +107,10 @@ def _compare_bench(
         bench_table,
         bench_title,
     )
-    from gecar.world.robot import load_robot
 
     if program is not None:
         raise expected("--program", "recordings from a bench", "recordings of a program on the floor")
-    found = bench_gap(trials, load_robot(robot or trials[0].setup.robot))
+    found = bench_gap(trials, robot)
     for line in bench_lines(found):
         output.print(line)
     written = _write(out, bench_markdown(found), bench_csv(found), bench_table(found))

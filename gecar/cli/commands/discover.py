@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from gecar.cli.output import JsonOption, Output
-from gecar.errors import expected
+from gecar.errors import InputError, expected
 from gecar.reality.materiality import DEFAULT, Material
 
 
@@ -77,7 +78,7 @@ def discover(
       gecar evolve --robot verdicts/monday/robot.toml
     """
     from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller
-    from gecar.cli.inputs import find_program
+    from gecar.cli.inputs import find_program, warnings_of
     from gecar.language.program import read_program
     from gecar.parallel.executors import usable_cores
     from gecar.reality.recordings.recording import read_case
@@ -98,6 +99,10 @@ def discover(
         folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures, line, driven)
         for folder, case in folders(out, cases).items()
     }
+    for task in tasks.values():
+        recordings = task.case.recordings
+        with suppress(InputError):  # the case's own error says so
+            output.warn(warnings_of(recordings, known or load_robot(recordings[0].setup.robot)))
     if kind != "serial" or len(tasks) > 1:
         conclude_all(output, tasks, kind, workers or usable_cores(), scheduler)
         return

@@ -1,6 +1,6 @@
 """Recordings: one run of a real robot (or of a motor on a bench) as arrays, read from CSV and written back.
 
-The file format is in `docs/`; a file's units become SI here and nowhere else.
+The file format is in `docs/files.md`; a file's units become SI here and nowhere else.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 
 from gecar.errors import InputError, expected
 from gecar.reality.recordings.columns import COLUMNS, Series
-from gecar.reality.recordings.importing.cap import guess_cap
+from gecar.reality.recordings.duty_cap import guess_cap
 from gecar.reality.recordings.importing.clock import ClockOffset
 from gecar.reality.recordings.importing.frame import Frame
 from gecar.reality.recordings.importing.join import join
@@ -121,7 +121,7 @@ def import_logs(
     pairs = _one_run(files, options) if options.one_clock else _pairs(files, options)
     imported = [_joined(brick, camera, robot, setup, options) for brick, camera in pairs]
     if setup.duty_cap is None:
-        imported = _capped(imported, robot, machine)
+        imported = _capped(imported, robot)
     return tuple(imported)
 
 
@@ -138,13 +138,12 @@ def _joined(brick: Log, camera: Log | None, robot: Robot, setup: Setup, options:
     return Imported(replace(recording, name=brick.stem), guesses, tuple(repairs), joining.offset)
 
 
-def _capped(imported: list[Imported], robot: Robot, machine: Machine) -> list[Imported]:
+def _capped(imported: list[Imported], robot: Robot) -> list[Imported]:
     """Guess from all recordings together whether the robot's cap on duty held, and say so."""
-    cap, reason = guess_cap([each.recording for each in imported], robot, machine.dps_per_pct)
+    cap, reason = guess_cap([each.recording for each in imported], robot)
     if not reason:
         return imported
-    told = "no cap" if cap else f"the cap of robot {robot.name} stays"
-    line = f"duty: {reason}: {told} (--duty-cap says otherwise)"
+    line = f"{reason} (--duty-cap says otherwise)"
     return [
         replace(
             each,

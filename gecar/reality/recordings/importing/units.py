@@ -10,6 +10,7 @@ import numpy as np
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import Series
+from gecar.reality.recordings.duty_cap import no_load_speed
 from gecar.world.kernel.motor import FULL_SPEED
 from gecar.world.robot import Robot
 
@@ -82,11 +83,9 @@ class Machine:
 
     @classmethod
     def of(cls, robot: Robot, counts: float | None = None) -> Machine:
-        """Take from a robot what units depend on; its motors turn a little slower than without load."""
-        emf, regulated = robot.motor.back_emf_constant, robot.drive.mode == "speed"
-        free = robot.battery.voltage / 100.0 / emf if emf else np.inf
-        rate = float(np.rad2deg(0.01 * FULL_SPEED)) if regulated else 0.85 * float(np.rad2deg(free))
-        body = robot.body
+        """Take from a robot what units depend on."""
+        body, regulated = robot.body, robot.drive.mode == "speed"
+        rate = float(np.rad2deg(0.01 * FULL_SPEED)) if regulated else no_load_speed(robot)
         return cls(
             robot.name, rate, body.wheel_radius, body.track_width, robot.battery.voltage, regulated, counts
         )

@@ -46,17 +46,18 @@ def _settled(t_s: Series, duty_pct: Series, angle_deg: Series) -> list[tuple[flo
     return found
 
 
-def guess_cap(recordings: Sequence[Recording], robot: Robot, dps_per_pct: float) -> tuple[float | None, str]:
+def guess_cap(recordings: Sequence[Recording], robot: Robot) -> tuple[float | None, str]:
     """Guess whether the robot's cap on duty held in recordings of it, all made in one way.
+
+    A wheel's settled speed beyond the cap tells, beside a line through those below it; without any below, beside the
+    speed of the robot's own motors.
 
     Parameters
     ----------
     recordings
-        Of one robot and rig.
+        Of one robot and rig, none with a cap of its own.
     robot
         As it is known, with its cap.
-    dps_per_pct
-        Speed of its motors per percent of duty [deg/s], where the recordings hold no duty below the cap.
 
     Returns
     -------
@@ -66,23 +67,38 @@ def guess_cap(recordings: Sequence[Recording], robot: Robot, dps_per_pct: float)
         In words; empty where no command goes beyond the cap.
     """
     cap = 100.0 * robot.drive.duty_cap
-    most = max(float(np.nanmax(np.abs(r.commands), initial=0.0)) for r in recordings) * 100.0
+    most = 100.0 * max((float(np.abs(r.commands).max(initial=0.0)) for r in recordings), default=0.0)
     if most <= cap + _LEAST_ABOVE_PCT or robot.drive.mode == "speed":
         return None, ""
-    reach = f"commands reach {most:.3g} %, beyond the {cap:.3g} % that robot {robot.name} is capped at"
+    reach = f"duties reach {most:.3g} %, beyond the {cap:.3g} % that robot {robot.name} is capped at"
     speeds = settled_speeds(recordings)
     above = np.array([point for point in speeds if point[0] > cap + _LEAST_ABOVE_PCT])
     if not len(above):
         bench = recordings[0].setup.rig == "bench"
-        told = "a bench has no cap" if bench else "and no wheel held still enough to tell"
-        return (1.0 if bench else None), f"{reach}: {told}"
+        told = (
+            "on a bench, taken as not capped"
+            if bench
+            else "none was held long enough to tell: taken as capped"
+        )
+        return (1.0 if bench else None), f"{reach}; {told}"
     below = np.array([point for point in speeds if 0.25 * cap <= point[0] <= cap])
-    start, slope = _line(below, dps_per_pct)
+    start, slope = _line(below, no_load_speed(robot))
     free, capped = start + slope * above[:, 0], start + slope * cap
-    share = float(np.median((above[:, 1] - capped) / (free - capped)))
-    if share > 0.5:
-        return 1.0, f"{reach}, and wheels turn faster there: not capped"
-    return None, f"{reach}, and wheels turn no faster there: capped"
+    if float(np.median((above[:, 1] - capped) / (free - capped))) > 0.5:
+        return 1.0, f"{reach}; wheels turn faster beyond: not capped"
+    return None, f"{reach}; wheels turn no faster beyond: capped"
+
+
+def no_load_speed(robot: Robot) -> float:
+    """Return how fast a robot's motors turn per percent of duty [deg/s], a little slower than without any load."""
+    emf = robot.motor.back_emf_constant
+    return 0.85 * float(np.rad2deg(robot.battery.voltage / 100.0 / emf))
+
+
+def cap_warning(recordings: Sequence[Recording], robot: Robot) -> str:
+    """Return a warning where recordings that name no cap were surely made without the robot's; else nothing."""
+    cap, reason = guess_cap([r for r in recordings if r.setup.duty_cap is None], robot)
+    return f"{reason}: write duty_cap = 1.0 into their TOML files" if cap else ""
 
 
 def _line(below: Series, dps_per_pct: float) -> tuple[float, float]:
