@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +39,27 @@ def expected(where: str | Path, found: object, wanted: str) -> InputError:
         ``where: found …, expected …``; raise it.
     """
     return InputError(f"{where}: found {found}, expected {wanted}")
+
+
+def one_of(where: str | Path, found: str, known: Iterable[str], wanted: str = "") -> InputError:
+    """Make the error for a name that is none of those known; it asks for the nearest one.
+
+    Parameters
+    ----------
+    where
+        As in `expected`.
+    found
+        The name that stands there.
+    known
+        Which names there are.
+    wanted
+        What else may stand there, such as ``a course file (.toml)``.
+    """
+    names = list(known)
+    near = difflib.get_close_matches(found, names, 1, 0.6)
+    asked = f"; did you mean '{near[0]}'?" if near else ""
+    other = f"{wanted} or " if wanted else ""
+    return expected(where, f"'{found}'", f"{other}one of {', '.join(names)}{asked}")
 
 
 def first_fault(error: ValidationError, where: str | Path, fields: str, *, between: str = ", ") -> InputError:

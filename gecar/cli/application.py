@@ -79,7 +79,7 @@ COMMANDS = (
     ),
     CommandEntry("check", EVOLVE, "Rerun a table of fitness figures and report changes.", "check:check"),
     CommandEntry("course", COURSES, "List, show, print and make courses.", "course:course"),
-    CommandEntry("robot", COURSES, "List and show the robots that ship with gecar.", "robot:robot"),
+    CommandEntry("robot", COURSES, "List, show and make robots.", "robot:robot"),
     CommandEntry("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     CommandEntry("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
     CommandEntry("import", ROBOT, "Make recordings from the logs people have on disk.", "import_:import_"),
@@ -161,7 +161,6 @@ def application() -> typer.Typer:
         cls=Commands,
         rich_markup_mode="rich",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["--help", "-h"]},
     )

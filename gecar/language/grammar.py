@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from gecar.errors import InputError, expected
+from gecar.errors import InputError, expected, one_of
 from gecar.files import is_file, is_folder, read_text, shipped
 from gecar.language.bnf import RawRule, Reference, parse_rules
 from gecar.language.source_position import place, plain
@@ -208,11 +208,7 @@ def load_grammar(name: str | Path, ranges: Mapping[str, int] | None = None) -> G
             return read_grammar(named, ranges)
     if is_folder(path):
         return read_grammar(path, ranges)  # the error says so
-    raise expected(
-        "grammar",
-        f"no file or grammar {str(name)!r}",
-        f"a .bnf file, or one of {', '.join(sorted(list_grammars()))}",
-    )
+    raise one_of("grammar", str(name), sorted(list_grammars()), "a .bnf file")
 
 
 def list_grammars() -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from gecar.errors import expected
 from gecar.files import read_text
 from gecar.language import opcodes
 from gecar.language.source_position import plain
@@ -135,9 +136,12 @@ def read_program(path: Path) -> Program:
     Raises
     ------
     InputError
-        If the file cannot be read, or as `parse_program`.
+        If the file cannot be read, holds no statement, or as `parse_program`.
     """
-    return parse_program(read_text(path, "a program file"), str(path))
+    program = parse_program(read_text(path, "a program file"), str(path))
+    if not program.statements:
+        raise expected(path, "an empty program", "a statement, as motor(50,50,100)")
+    return program
 
 
 def mirrored(program: Program) -> Program:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from gecar.errors import InputError, expected, first_fault
+from gecar.errors import InputError, first_fault, one_of
 from gecar.files import is_file, read_toml, write_whole
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS, Parameter
 
@@ -252,8 +252,7 @@ def robot_file(name_or_path: str | Path) -> Path:
     if path.suffix == ".toml" or is_file(path):
         return path
     if str(name_or_path) not in list_robots():
-        wanted = f"a robot file (.toml) or one of {', '.join(list_robots())}"
-        raise expected("--robot", f"'{name_or_path}'", wanted)
+        raise one_of("--robot", str(name_or_path), list_robots(), "a robot file (.toml)")
     return _SHIPPED / f"{name_or_path}.toml"
 
 

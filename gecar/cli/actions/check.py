@@ -9,8 +9,10 @@ from pathlib import Path
 
 import typer
 
+import gecar
 from gecar.cli.output import Output
 from gecar.compiled import is_cold
+from gecar.errors import expected
 from gecar.parallel.executors import check_workers, open_executor, usable_cores
 from gecar.report.check import as_rows, moves_table
 from gecar.results.fitness_table import (
@@ -27,6 +29,24 @@ from gecar.results.fitness_table import (
     run_again,
     write_table,
 )
+
+TABLE = Path("benchmarks/fitness_table.toml")
+
+
+def find_table() -> Path:
+    """Return gecar's own table: below this folder, or beside the sources of gecar.
+
+    Raises
+    ------
+    InputError
+        If it is in neither; the message says where it was looked for.
+    """
+    places = [TABLE, Path(gecar.__file__).parents[1] / TABLE]
+    for place in places:
+        if place.is_file():
+            return place
+    looked = " and ".join(str(place.absolute()) for place in places)
+    raise expected("check", f"no table at {looked}", "TABLE.toml; gecar's own comes with its repository")
 
 
 def guard(output: Output, path: Path, update: bool, workers: int | None) -> None:

@@ -12,8 +12,10 @@ from gecar.cli.output import JsonOption, Output
 
 def check(
     table: Annotated[
-        Path, typer.Argument(metavar="TABLE.toml", help="The fitness table; --update fills in rows without figures.")
-    ] = Path("benchmarks/fitness_table.toml"),
+        Path | None,
+        typer.Argument(metavar="TABLE.toml", help="The fitness table; --update fills in rows without figures.",
+                       show_default="benchmarks/fitness_table.toml, here or beside gecar"),
+    ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the new figures to the table.")] = False,
     pins: Annotated[
         bool, typer.Option("--pins", help="Only print the library versions of the table, for pip install -r.")
@@ -40,9 +42,10 @@ def check(
 
     if workers != 1 and not pins:
         prepare_workers()
-    from gecar.cli.actions.check import guard, print_pins
+    from gecar.cli.actions.check import find_table, guard, print_pins
 
+    place = table or find_table()
     if pins:
-        print_pins(table)
+        print_pins(place)
     else:
-        guard(Output(as_json), table, update, workers)
+        guard(Output(as_json), place, update, workers)

@@ -24,7 +24,10 @@ def plot(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FOLDER", help="Output folder for the pictures.", show_default="the run, or here"
+            "--out",
+            metavar="FOLDER",
+            help="Output folder for the pictures, also for those given a name.",
+            show_default="the run, or here",
         ),
     ] = None,
     tree: Annotated[
@@ -60,7 +63,8 @@ def plot(
     if len(runs) > 1:
         _compare(output, runs, out or Path(), {**named, "--html": page})
     else:
-        _study(output, runs[0], out or runs[0], named, page)
+        placed = {option: file and (out or Path()) / file for option, file in named.items()}
+        _study(output, runs[0], out or runs[0], placed, page)
 
 
 def _compare(output: Output, runs: list[Path], out: Path, of_one: dict[str, Any]) -> None:

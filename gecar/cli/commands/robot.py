@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 robot = typer.Typer(
     name="robot",
-    help="List and show robots.",
+    help="List, show and make robots.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     add_completion=False,
@@ -58,7 +59,7 @@ def show(
 
     [bold]Example[/]
 
-      gecar robot show paper > mine.toml
+      gecar robot show paper
     """
     from gecar.files import read_text
     from gecar.world.robot import load_robot, robot_file
@@ -67,6 +68,41 @@ def show(
     loaded = load_robot(name)
     output.print(read_text(robot_file(name), "a robot file").rstrip())
     output.print_json({"robot": name, **facts(loaded), "constants": loaded.model_dump()})
+
+
+@robot.command()
+def new(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.toml.", show_default=False)
+    ],
+    like: Annotated[
+        str, typer.Option("--like", metavar="NAME|FILE", help="The robot whose file it begins with.")
+    ] = "ev3",
+    as_json: JsonOption = False,
+) -> None:
+    """Write a robot file to begin with: every constant with its unit and source, to be edited by hand.
+
+    [bold]Example[/]
+
+      gecar robot new mine.toml
+      gecar evolve --robot mine.toml
+    """
+    from gecar.calling import command
+    from gecar.errors import expected
+    from gecar.files import read_text, write_whole
+    from gecar.world.robot import load_robot, robot_file
+
+    output = Output(as_json)
+    if file.suffix != ".toml":
+        raise expected("FILE", f"'{file}'", "a name that ends in .toml")
+    if file.exists():
+        raise expected(file, "a file that exists", "a new name")
+    named = load_robot(like).name
+    text = read_text(robot_file(like), "a robot file")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(file, text.replace(f'name = "{named}"', f"name = {json.dumps(file.stem)}", 1))
+    output.print(f"Wrote {file}. Edit it, then: {command()} evolve --robot {file}")
+    output.print_json({"file": str(file)})
 
 
 def facts(loaded: Robot) -> dict[str, Any]:

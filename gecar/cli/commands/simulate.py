@@ -49,13 +49,13 @@ def simulate(
     engine: EngineOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Output folder for trajectory.png.", show_default="here",
+        typer.Option("--out", metavar="FOLDER", help="Output folder for trajectory.png.", show_default="beside the program",
                      rich_help_panel=PICTURES),
     ] = None,
     picture: Annotated[
         Path | None,
         typer.Option("--picture", metavar="FILE", help="Name of the picture: .png, .pdf or .svg.",
-                     show_default="trajectory.png", rich_help_panel=PICTURES),
+                     show_default="trajectory.png; of a run simulation.png", rich_help_panel=PICTURES),
     ] = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.", rich_help_panel=PICTURES)] = False,
     colour: Annotated[
@@ -101,9 +101,9 @@ def simulate(
     output = Output(as_json)
     if seed is not None and not 0 <= seed <= LARGEST_SEED:
         raise expected("--seed", seed, f"a whole number from 0 to {LARGEST_SEED}")
-    target = None if no_picture else (out or Path()) / (picture or Path("trajectory.png"))
-    _check_pictures(target, colour, animate, pace)
     file, settings = find_program(program)
+    target = None if no_picture else _target(file, bool(settings), out, picture)
+    _check_pictures(target, colour, animate, pace)
     world = build_world(settings, course, robot, noise, motor_noise, time_limit, engine)
     loaded = read_program(file)
     which = drive_seed(seed, settings, loaded)
@@ -120,6 +120,13 @@ def simulate(
     output.print_json(
         {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
     )
+
+
+def _target(file: Path, of_run: bool, out: Path | None, picture: Path | None) -> Path:
+    """Return where the picture goes: as told, or beside the program, where a run's own picture stays as it is."""
+    if picture is not None:
+        return (out or Path()) / picture
+    return (out or file.parent) / ("simulation.png" if of_run and out is None else "trajectory.png")
 
 
 def _check_pictures(target: Path | None, colour: str, animate: Path | None, pace: float) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gecar.errors import expected
+from gecar.errors import expected, one_of
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.recordings.recording import Case, Recording
 
@@ -36,16 +36,15 @@ class Split:
 def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
     """Set recordings aside: those named, or every fourth counted from the last, or the end of the only one.
 
+    The beginning of a name is enough where no other begins so.
+
     Raises
     ------
     InputError
         If a name is no recording of the case, or nothing is left to fit on.
     """
-    wanted = {name.removesuffix(".csv") for name in names if name}
     known = [r.name for r in case.recordings]
-    for name in sorted(wanted):
-        if name not in known:
-            raise expected("--holdout", f"'{name}'", f"one of {', '.join(known)}")
+    wanted = {_named(name.removesuffix(".csv"), known) for name in names if name}
     if not wanted and len(known) == 1:
         return _by_time(case.recordings[0])
     if not wanted:
@@ -54,6 +53,16 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
     if not fitted:
         raise expected("--holdout", "all recordings", "at least one left to fit on")
     return Split(fitted, tuple(r for r in case.recordings if r.name in wanted))
+
+
+def _named(name: str, known: Sequence[str]) -> str:
+    """Return the recording of a name, or the only one whose name begins so."""
+    begun = [each for each in known if each.startswith(name)]
+    if name in known or len(begun) == 1:
+        return name if name in known else begun[0]
+    if begun:
+        raise expected("--holdout", f"'{name}', as {' and '.join(begun)} begin", "more of the name")
+    raise one_of("--holdout", name, known)
 
 
 def _by_time(recording: Recording) -> Split:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 
-from gecar.errors import InputError, expected
+from gecar.errors import InputError, expected, one_of
 from gecar.files import is_file, read_text, shipped
 from gecar.world.course import line, raster
 from gecar.world.course.builder import parts_from
@@ -208,11 +208,7 @@ def load_course(name_or_path: str | Path) -> Course:
     path = Path(name_or_path)
     if path.suffix != ".toml" and not is_file(path):
         if str(name_or_path) not in list_courses():
-            raise expected(
-                "--course",
-                f"'{name_or_path}'",
-                f"a course file (.toml) or one of {', '.join(list_courses())}",
-            )
+            raise one_of("--course", str(name_or_path), list_courses(), "a course file (.toml)")
         path = COURSES / f"{name_or_path}.toml"
     if is_file(path) and path.stat().st_size > _LARGEST_FILE:
         raise expected(path, f"{path.stat().st_size} bytes", f"a course file of at most {_LARGEST_FILE}")
