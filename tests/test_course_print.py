@@ -2,7 +2,9 @@ import re
 import zlib
 
 import pytest
+import shapely
 from PIL import Image
+from shapely.geometry import box
 
 from courses import make_course
 from gecar.errors import InputError
@@ -65,22 +67,37 @@ def test_one_sheet_shows_the_whole_field_at_true_scale(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["paper", "figure_eight"])
-@pytest.mark.parametrize("paper", ["A4", "A3"])
-def test_sheets_cover_every_tile_and_fit_their_paper(name, paper):
-    import shapely
-    from shapely.geometry import box
-
+@pytest.mark.parametrize("paper", ["A4", "A3", "Letter"])
+def test_sheets_cover_line_and_marks_and_fit_their_paper(name, paper):
     course = load_course(name)
     plan = plan_sheets(course, paper)
     covered = shapely.union_all(
         [box(s.x, s.y, s.x + s.width, s.y + s.height).buffer(0.01) for s in plan.sheets]
     )
-    for k, drivable in enumerate(course.drivable):
-        square = shapely.affinity.scale(course.layout.square(k), 1000, 1000, origin=(0, 0))
-        assert covered.covers(square) or not drivable
+    marks = [course.layout.square(k) for k in (course.start_tile, course.goal)]
+    for marked in (course.line_area, *marks):
+        assert covered.covers(shapely.affinity.scale(marked, 1000, 1000, origin=(0, 0)))
     for sheet in plan.sheets:
         assert sheet.width + STRIP_MM + 2 * MARGIN_MM <= plan.page[0] + 1e-9
         assert sheet.height + STRIP_MM + MARGIN_MM + FOOT_MM <= plan.page[1] + 1e-9
+
+
+def test_sheets_of_bare_floor_are_left_out():
+    course = load_course("paper")
+    everything, line = (plan_sheets(course, "A4", only_line) for only_line in (False, True))
+    assert len(line.sheets) <= len(everything.sheets) <= 33  # of 61 that hold floor
+    for sheet in line.sheets:
+        piece = box(sheet.x, sheet.y, sheet.x + sheet.width, sheet.y + sheet.height)
+        assert (
+            piece.intersection(shapely.affinity.scale(course.line_area, 1000, 1000, origin=(0, 0))).area > 0
+        )
+
+
+def test_only_the_line_is_printed_where_that_is_asked_for(tmp_path):
+    plain, only = tmp_path / "plain.pdf", tmp_path / "only.pdf"
+    print_course(load_course("paper"), plain, "sheet")
+    print_course(load_course("paper"), only, "sheet", only_line=True)
+    assert only.stat().st_size < plain.stat().st_size
 
 
 def test_joined_sheets_name_each_other():
@@ -108,7 +125,7 @@ def test_a_scanned_course_is_printed_as_it_is(tmp_path):
 
 
 def test_unknown_papers_and_endless_pages_are_refused():
-    with pytest.raises(InputError, match="--paper: found 'A0', expected sheet or A4 or A3"):
+    with pytest.raises(InputError, match="--paper: found 'A0', expected sheet or A4 or A3 or Letter"):
         plan_sheets(make_course(), "A0")
     with pytest.raises(InputError, match="PDF ends at 5 m"):
         plan_sheets(make_course("-" * 20, goal="[19, 0]", start="[0, 0]", heading='"right"'), "sheet")

@@ -113,7 +113,7 @@ def print_out(
     paper: Annotated[
         str,
         typer.Option(
-            "--paper", metavar="A4|A3|sheet", help="Paper size; sheet: the whole course on one page."
+            "--paper", metavar="A4|A3|Letter|sheet", help="Paper size; sheet: the whole course on one page."
         ),
     ] = "A4",
     out: Annotated[
@@ -121,6 +121,9 @@ def print_out(
         typer.Option("--out", metavar="FILE", help="Output file.", show_default="COURSE-PAPER.pdf"),
     ] = None,
     no_guides: Annotated[bool, typer.Option("--no-guides", help="Leave out tiles, START and GOAL.")] = False,
+    only_line: Annotated[
+        bool, typer.Option("--only-line", help="Print the line and nothing else, on the sheets it crosses.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make a PDF of a course at true scale, as one sheet or tiled with cut and joint marks.
@@ -133,7 +136,7 @@ def print_out(
       gecar course print hairpin --paper A3 --out hairpin.pdf
     """
     from gecar.plots.courses.course_print import print_course
-    from gecar.plots.courses.sheets import PAPERS
+    from gecar.plots.courses.sheets import PAPERS, plan_sheets
     from gecar.world.course.course import load_course
 
     output = Output(as_json)
@@ -144,9 +147,11 @@ def print_out(
     target = out or Path(f"{loaded.name}-{known[paper.lower()]}.pdf")
     if target.suffix.lower() != ".pdf":
         raise expected("--out", f"'{target}'", "a name that ends in .pdf")
-    plan = print_course(loaded, target, known[paper.lower()], guides=not no_guides)
-    sheets = "1 sheet" if len(plan.sheets) == 1 else f"{len(plan.sheets)} sheets and an overview"
-    output.print(f"{target}: {sheets}. Print at 100 %, and check the ruler.")
+    count = len(plan_sheets(loaded, known[paper.lower()], only_line).sheets)
+    sheets = "1 sheet" if count == 1 else f"{count} sheets of {known[paper.lower()]} and an overview"
+    output.print(f"{loaded.title or loaded.name}: {sheets}.")
+    plan = print_course(loaded, target, known[paper.lower()], guides=not no_guides, only_line=only_line)
+    output.print(f"Written: {target}. Print at 100 %, and check the ruler.")
     output.print_json({"course": name, "file": str(target), "sheets": len(plan.sheets), "page_mm": plan.page})
 
 

@@ -1,4 +1,4 @@
-"""A course on paper at true scale: one sheet, or A4 or A3 sheets to cut and join; vector PDF.
+"""A course on paper at true scale: one sheet, or A4, A3 or Letter sheets to cut and join; vector PDF.
 
 Every sheet shows a piece of the field inside a frame that is its cutting line. To the right and above, where
 another sheet joins, the print goes on for a strip: the neighbour, cut along its own frame, is glued onto it.
@@ -43,7 +43,7 @@ _TEXT_MM = 42.0
 _INSTRUCTIONS = """{} sheets. Print them at 100 %, without fitting to the page; the ruler on each must measure 100 mm.
 Cut each along its frame on the left and below, and leave the strips on the right and above.
 Start with the lowest row on the left; glue each sheet onto its neighbours' strips, so that the diamonds close.
-Sheets that no robot may drive on are left out."""
+Sheets of bare floor are left out."""
 
 
 class _Floor(NamedTuple):
@@ -54,7 +54,9 @@ class _Floor(NamedTuple):
     words: list[tuple[Point, str]]
 
 
-def print_course(course: Course, path: Path, paper: str = "A4", guides: bool = True) -> Plan:
+def print_course(
+    course: Course, path: Path, paper: str = "A4", guides: bool = True, only_line: bool = False
+) -> Plan:
     """Write a course as PDF at true scale.
 
     Parameters
@@ -64,9 +66,11 @@ def print_course(course: Course, path: Path, paper: str = "A4", guides: bool = T
     path
         Where to.
     paper
-        "A4", "A3", or "sheet" for the whole field on one page.
+        "A4", "A3", "Letter", or "sheet" for the whole field on one page.
     guides
         Whether to draw tiles, START, GOAL, walls and the places of obstacles as hairlines.
+    only_line
+        Whether to print the line and nothing else, on the sheets it crosses.
 
     Returns
     -------
@@ -78,7 +82,7 @@ def print_course(course: Course, path: Path, paper: str = "A4", guides: bool = T
     InputError
         As `gecar.plots.courses.sheets.plan_sheets`.
     """
-    plan, floor = plan_sheets(course, paper), _floor(course, guides)
+    plan, floor = plan_sheets(course, paper, only_line), _floor(course, guides and not only_line)
     about = {"Title": f"{course.title or course.name}, 1:1", "Creator": "gecar", "CreationDate": None}
     look: Any = {
         "path.simplify": False,

@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from shapely import affinity
-from shapely.geometry import box
+from shapely.geometry import LineString, box
+from shapely.geometry.base import BaseGeometry
 
 from gecar.errors import expected
 from gecar.world.course.course import Course
 
-PAPERS_MM = {"A4": (210.0, 297.0), "A3": (297.0, 420.0)}
+PAPERS_MM = {"A4": (210.0, 297.0), "A3": (297.0, 420.0), "Letter": (215.9, 279.4)}
 PAPERS = ("sheet", *PAPERS_MM)
 # Printers leave up to 6 mm blank; the foot holds ruler and name.
 MARGIN_MM, FOOT_MM, STRIP_MM = 12.0, 24.0, 10.0
@@ -53,15 +54,17 @@ class Plan(NamedTuple):
     sheets: list[Sheet]
 
 
-def plan_sheets(course: Course, paper: str) -> Plan:
-    """Divide a course's field into sheets; those wholly off the course are left out.
+def plan_sheets(course: Course, paper: str, only_line: bool = False) -> Plan:
+    """Divide a course's field into sheets; those with nothing but bare floor are left out.
 
     Parameters
     ----------
     course
         What to print.
     paper
-        "A4" or "A3", upright or lying, whichever takes fewer sheets; "sheet": the whole field on one page.
+        "A4", "A3" or "Letter", upright or lying, whichever takes fewer sheets; "sheet": the whole field on one page.
+    only_line
+        Whether to leave out sheets without line, too, though START, GOAL, a wall or an obstacle is marked there.
 
     Raises
     ------
@@ -73,7 +76,9 @@ def plan_sheets(course: Course, paper: str) -> Plan:
     if paper not in PAPERS_MM:
         raise expected("--paper", f"'{paper}'", " or ".join(PAPERS))
     short, long = PAPERS_MM[paper]
-    plan = min((_tiled(course, page) for page in ((short, long), (long, short))), key=lambda p: len(p.sheets))
+    printed = _printed(course, only_line)
+    plans = (_tiled(course, page, printed) for page in ((short, long), (long, short)))
+    plan = min(plans, key=lambda plan: len(plan.sheets))
     if len(plan.sheets) > _MOST_SHEETS:
         raise expected(
             "--paper", f"{paper}, which takes {len(plan.sheets)} sheets", f"at most {_MOST_SHEETS}"
@@ -86,23 +91,33 @@ def _one_sheet(course: Course) -> Plan:
     page = width + 2 * MARGIN_MM, height + MARGIN_MM + FOOT_MM
     if max(page) > _LONGEST_PAGE_MM:
         raise expected(
-            "--paper", f"sheet, for a field of {width:g} x {height:g} mm", "A4 or A3: PDF ends at 5 m"
+            "--paper", f"sheet, for a field of {width:g} x {height:g} mm", "A4, A3 or Letter: PDF ends at 5 m"
         )
     return Plan(page, [Sheet("A1", 0.0, 0.0, width, height)])
 
 
-def _tiled(course: Course, page: tuple[float, float]) -> Plan:
+def _printed(course: Course, only_line: bool) -> BaseGeometry:
+    """Return where sheets are needed [mm]: line, and the places marked; of a picture all that may be driven on."""
+    layout = course.layout
+    squares = [layout.square(int(k)) for k in np.flatnonzero(course.drivable)]
+    parts: list[BaseGeometry] = [*squares] if course.image else [course.line_area]
+    if not only_line:
+        parts += [layout.square(course.start_tile), layout.square(course.goal)]
+        parts += [LineString([wall[:2], wall[2:]]).buffer(0.001) for wall in course.walls]
+        parts += [obstacle.outline for obstacle in course.obstacles]
+    return affinity.scale(shapely.union_all(parts), 1000.0, 1000.0, origin=(0, 0))
+
+
+def _tiled(course: Course, page: tuple[float, float], printed: BaseGeometry) -> Plan:
     width, height = 1000.0 * course.width_m, 1000.0 * course.height_m
     step_x, step_y = page[0] - 2 * MARGIN_MM - STRIP_MM, page[1] - MARGIN_MM - FOOT_MM - STRIP_MM
-    tiles = shapely.union_all([course.layout.square(int(k)) for k in np.flatnonzero(course.drivable)])
-    floor = affinity.scale(tiles, 1000.0, 1000.0, origin=(0, 0))
-    shapely.prepare(floor)
+    shapely.prepare(printed)
     pieces = {}
     for row in range(math.ceil(height / step_y - 1e-9)):
         for column in range(math.ceil(width / step_x - 1e-9)):
             x, y = column * step_x, row * step_y
             size = min(step_x, width - x), min(step_y, height - y)
-            if floor.intersection(box(x, y, x + size[0], y + size[1])).area > 0.0:
+            if printed.intersection(box(x, y, x + size[0], y + size[1])).area > 0.0:
                 pieces[column, row] = (x, y, *size)
     return Plan(page, [Sheet(_name(*at), *piece, *_joined(*at, pieces)) for at, piece in pieces.items()])
 
