@@ -49,7 +49,8 @@ def simulate(
     engine: EngineOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Output folder for trajectory.png.", show_default="beside the program",
+        typer.Option("--out", metavar="FOLDER", help="Output folder for trajectory.png.",
+                     show_default="beside the program",
                      rich_help_panel=PICTURES),
     ] = None,
     picture: Annotated[
