@@ -112,6 +112,13 @@ def spawn(seed: int, generation: int, attempt: int, n: int) -> Streams:
     return words.view(STREAM)
 
 
+def generators(streams: Streams) -> list[np.random.Generator]:
+    """Return a NumPy generator from each stream; the streams go on, so that the next call gives others."""
+    with np.errstate(over="ignore"):
+        streams["stream"] += _STRIDE
+    return [np.random.default_rng(state) for state in streams["stream"].tolist()]
+
+
 @compiled
 def below(holder: Any, n: int) -> int:
     """Return a whole number 0..n-1 from a stream, each as likely as the others to 2**-53 n."""

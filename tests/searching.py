@@ -52,14 +52,14 @@ def new_evolution(
     settings: Settings, mapper: Mapper = MAPPER, seed: int = 1, n_arrivals: int = 0
 ) -> Evolution[Program]:
     """An evolution of robot programs."""
-    return Evolution(settings, mapper, RobotPrograms.of(settings, n_arrivals), seed)
+    return Evolution(mapper, RobotPrograms.of(settings, n_arrivals), settings, seed)
 
 
 def resume_evolution(
     settings: Settings, mapper: Mapper, state: State, n_arrivals: int = 0
 ) -> Evolution[Program]:
     """The same from a state on."""
-    return Evolution.resume(settings, mapper, RobotPrograms.of(settings, n_arrivals), state)
+    return Evolution.resume(state, mapper, RobotPrograms.of(settings, n_arrivals), settings)
 
 
 def generations(evolution: Evolution[Program], n: int) -> Evolution[Program]:

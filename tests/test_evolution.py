@@ -6,7 +6,6 @@ import pytest
 
 from gecar.errors import InputError
 from gecar.evolution.ask_tell import Evolution
-from gecar.evolution.problem import TextProblem
 from gecar.evolution.settings import EvolutionSettings
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
@@ -25,7 +24,7 @@ def value(text: str, x: float) -> float:
 
 
 def evolved(seed: int) -> Evolution[str]:
-    evolution = Evolution(SMALL, SUMS, TextProblem(), seed)
+    evolution: Evolution[str] = Evolution(SUMS, settings=SMALL, seed=seed)
     while not evolution.finished:
         texts = [candidate.program for candidate in evolution.ask()]
         evolution.tell([sum(abs(value(text, x) - y) for x, y in TARGET) for text in texts])
@@ -45,4 +44,4 @@ def test_equal_seeds_find_the_same() -> None:
 
 def test_lexicase_needs_cases() -> None:
     with pytest.raises(InputError, match="selection: found lexicase without cases"):
-        Evolution(SMALL.model_copy(update={"selection": "lexicase"}), SUMS, TextProblem())
+        Evolution(SUMS, settings=SMALL.model_copy(update={"selection": "lexicase"}))

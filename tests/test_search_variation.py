@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from searching import MAPPER, SMALL
 
 from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
-from gecar.evolution.initialisation import initialise
 from gecar.evolution.mutation import Creep, Duplicate, Flip
+from gecar.evolution.operators import Operators
 from gecar.evolution.selection import deviations, lexicase, tournament
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
@@ -191,7 +191,7 @@ def test_lexicase_cases_are_the_times_between_checkpoints() -> None:
 @pytest.mark.parametrize("plan", ["sensible", "ptc2"])
 def test_planned_first_genomes_are_valid_and_varied(plan: str) -> None:
     chosen = SMALL.model_copy(update={"initialisation": plan, "codons": 400})
-    mapped = MAPPER.map(initialise(chosen, MAPPER, spawn(1, 0, 0, 100)))
+    mapped = MAPPER.map(Operators.of(chosen).initialise(MAPPER, spawn(1, 0, 0, 100)))
     assert mapped.valid.all()
     assert len({mapped.key(i) for i in range(100)}) > 90
     assert mapped.used.max() > 2 * mapped.used.min()
@@ -199,7 +199,7 @@ def test_planned_first_genomes_are_valid_and_varied(plan: str) -> None:
 
 def test_ptc2_reaches_the_sizes_it_aims_at() -> None:
     chosen = SMALL.model_copy(update={"initialisation": "ptc2", "codons": 400, "initial_expansions": 60})
-    used = MAPPER.map(initialise(chosen, MAPPER, spawn(1, 0, 0, 300))).used
+    used = MAPPER.map(Operators.of(chosen).initialise(MAPPER, spawn(1, 0, 0, 300))).used
     assert 25 < np.median(used) < 45
     assert used.max() < 60 + 20
 
@@ -208,4 +208,4 @@ def test_ptc2_reaches_the_sizes_it_aims_at() -> None:
 @settings(deadline=None, max_examples=25)
 def test_no_plan_crashes_on_genomes_too_short_for_it(seed: int, plan: str, codons: int) -> None:
     chosen = SMALL.model_copy(update={"initialisation": plan, "codons": codons})
-    assert initialise(chosen, RICH, spawn(seed, 0, 0, 4)).shape == (4, codons)
+    assert Operators.of(chosen).initialise(RICH, spawn(seed, 0, 0, 4)).shape == (4, codons)

@@ -1,36 +1,46 @@
-"""The evolution, as ask and tell: it says which programs it wants scored, and is told their scores.
+"""The evolution: any grammar, any phenotype, any fitness.
 
-evolution = Evolution(EvolutionSettings(), Mapper(load_grammar("table1")), TextProblem(), seed=1)
+evolution = Evolution(Mapper(load_grammar("table1")), phenotype=formula, fitness=error, seed=1)
+evolution.run()
+print(evolution.best.program, evolution.best.fitness)
+
+Without a fitness it asks and is told: it says which programs it wants scored, and is told their scores.
+
+evolution = Evolution(Mapper(load_grammar("table1")), seed=1)
 while not evolution.finished:
-    evolution.tell([my_score(candidate.program) for candidate in evolution.ask()])
-print(evolution.best.program, evolution.best.merit)
+    evolution.tell([my_error(candidate.program) for candidate in evolution.ask()])
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, Generic
+from functools import partial
+from typing import Any, Generic, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.errors import expected
+from gecar.errors import InputError, expected
 from gecar.evolution.breeding import Bred, Breeder
+from gecar.evolution.crossover import Genomes
+from gecar.evolution.fitness import Fitness, FitnessProblem
 from gecar.evolution.history import HISTORY, Generation, Patience, Totals, summary
 from gecar.evolution.lineage import Ledger
+from gecar.evolution.operators import Operators
 from gecar.evolution.problem import P, Problem
 from gecar.evolution.score_cache import ScoreCache
-from gecar.evolution.scores import UNSOLVED, Scores, merits
+from gecar.evolution.scores import Scores, merits
 from gecar.evolution.settings import EvolutionSettings
 from gecar.evolution.state import Best, Candidate, State
-from gecar.language.mapping import Mapper
+from gecar.language.mapping import Derivation, Mapper
 
-Bytes = npt.NDArray[np.uint8]
 CONTENDERS = 40
 """Best programs kept, to choose from at the end."""
+BARREN = 1_000
+"""Genomes without a single phenotype after which an evolution gives up."""
 
 
 class Evolution(Generic[P]):
@@ -38,50 +48,86 @@ class Evolution(Generic[P]):
 
     Parameters
     ----------
-    settings
-        Sizes, rates and operators.
     mapper
         What genomes derive.
     problem
-        What derivations mean, and how scores compare.
+        In the place of phenotype and fitness, for problems whose scores are more than numbers.
+    settings
+        Sizes, rates and names of operators; by default the paper's Table 4.
     seed
         Random seed; equal seeds, equal runs.
+    phenotype
+        What a derivation means: returns the program, or None where it is none; by default its text. Derivations of
+        equal text share a score.
+    fitness
+        How good a program is: a function that returns a number, lower is better, or a
+        `gecar.evolution.fitness.Fitness`, which says more.
+    operators
+        What it breeds with, in the place of those the settings name.
 
     Raises
     ------
     InputError
-        If the seed is no whole number from 0 up, or lexicase has no cases.
+        If the seed is no whole number from 0 up, or operators, mapper and scores do not suit each other.
     """
 
     def __init__(
-        self, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], seed: int = 1
+        self,
+        mapper: Mapper,
+        problem: Problem[P] | None = None,
+        settings: EvolutionSettings | None = None,
+        seed: int = 1,
+        *,
+        phenotype: Callable[[Derivation], P | None] | None = None,
+        fitness: Fitness[P] | Callable[[P], Any] | None = None,
+        operators: Operators | None = None,
     ) -> None:
         if not 0 <= seed < 2**64:
             raise expected("seed", seed, "a whole number from 0 to 2^64 - 1")
-        if settings.selection == "lexicase" and problem.n_cases == 0:
-            raise expected("selection", "lexicase without cases", "scores with cases, or tournament")
+        if problem is None:
+            given = fitness if isinstance(fitness, Fitness) else Fitness(fitness)
+            problem = FitnessProblem(phenotype or cast("Any", str), given)
+        elif phenotype is not None or fitness is not None:
+            raise expected("problem", "one beside a phenotype or a fitness", "either the one or the others")
+        settings = settings or EvolutionSettings()
+        operators = operators or Operators.of(settings)
+        operators.check(mapper, problem.n_cases)
         self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
         self.history: list[Generation] = []
-        self.genomes: Bytes = np.zeros((0, settings.codons), np.uint8)
+        self.genomes: Genomes = np.zeros((0, 0), mapper.options.codon_type)
         self.scores: Scores = problem.failed(0)
         self._best: Best[P] | None = None
         self._contenders: dict[bytes, Best[P]] = {}
         self._cache = ScoreCache(problem.score_type)
-        self._breeder = Breeder(settings, mapper, problem, seed)
+        self._breeder = Breeder(settings, operators, mapper, problem, seed)
+        self._barren = 0
         self._bred: Bred[P] | None = None
         self._parents = np.zeros((0, 2), np.int32)
         self._ledger = Ledger()
-        self._patience = Patience(settings.restart_after)
+        self._patience = Patience(settings.restart_after, problem.failure)
         self._asked: dict[bytes, list[int]] = {}
         self._began: float | None = None
         self._earlier_s = 0.0
 
     @classmethod
     def resume(
-        cls, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], state: State
+        cls,
+        state: State,
+        mapper: Mapper,
+        problem: Problem[P],
+        settings: EvolutionSettings | None = None,
+        operators: Operators | None = None,
     ) -> Evolution[P]:
-        """Go on from a state, to the same end as if there had been no break."""
-        evolution = cls(settings, mapper, problem, state.seed)
+        """Go on from a state, to the same end as if there had been no break.
+
+        Parameters
+        ----------
+        state
+            What `state` returned.
+        mapper, problem, settings, operators
+            Those of the evolution it is from; `problem` is an attribute of it.
+        """
+        evolution = cls(mapper, problem, settings, state.seed, operators=operators)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
         for generation in evolution.history:
             evolution._patience.see(generation.best)
@@ -89,13 +135,14 @@ class Evolution(Generic[P]):
         evolution._ledger = Ledger(state.lineage, going_on=True)
         evolution._earlier_s = evolution.history[-1].wall_s
         evolution._cache.add([row.tobytes() for row in state.digests], state.cached)
-        program = problem.read(mapper.map(state.best_genome[None]), 0)
+        (found,) = evolution._breeder.read(state.best_genome[None])
+        program = None if found is None else found.program
         evolution._best = Best(state.best_genome, state.best_score, state.best_generation, program)
-        found = zip(
+        known = zip(
             state.contenders, state.contender_scores, state.contender_generations.tolist(), strict=True
         )
         for phenotype, (genome, score, generation) in zip(
-            evolution._breeder.read(state.contenders), found, strict=True
+            evolution._breeder.read(state.contenders), known, strict=True
         ):
             if phenotype is not None:
                 best = Best(
@@ -137,8 +184,9 @@ class Evolution(Generic[P]):
 
     @property
     def finished(self) -> bool:
-        """Whether the last generation has its scores."""
-        return self.generation == self.settings.generations
+        """Whether the last generation has its scores, or the best program is as good as the problem asks for."""
+        solved = self._best is not None and self.problem.solved(self._best.score[0])
+        return self.generation == self.settings.generations or solved
 
     @property
     def totals(self) -> Totals:
@@ -182,14 +230,16 @@ class Evolution(Generic[P]):
         Raises
         ------
         InputError
-            If the last generation asked for has not been told, or the run is finished.
+            If the last generation asked for has not been told, the run is finished, or no genome so far had a
+            phenotype.
         """
         self._refuse_while_asked("ask")
         if self.finished:
-            raise expected("ask", f"all {self.settings.generations} generations done", "an unfinished run")
+            raise expected("ask", f"all {self.generation} generations done", "an unfinished run")
         if self._began is None:
             self._began = time.perf_counter()
         self._bred = self._breed()
+        self._refuse_barren(self._bred)
         self._parents = self._bred.parents
         programs: dict[bytes, P] = {}
         self._asked = {}
@@ -199,7 +249,10 @@ class Evolution(Generic[P]):
                 self._asked.setdefault(phenotype.digest, []).append(i)
         to_beat = math.inf if self._best is None else self._best.merit
         generation, seed = len(self.history), self.seed
-        return [Candidate(p, self.problem.seed(p, seed), to_beat, generation) for p in programs.values()]
+        return [
+            Candidate(program, self.problem.seed(program, digest, seed), to_beat, generation)
+            for digest, program in programs.items()
+        ]
 
     def tell(self, results: Any) -> Generation:
         """Take the scores of the programs asked for.
@@ -207,8 +260,8 @@ class Evolution(Generic[P]):
         Parameters
         ----------
         results
-            In the order of `ask`: scores of the problem's dtype, or plain numbers, lower is better and 10000 for
-            failure.
+            In the order of `ask`: scores of the problem's dtype, or plain numbers as the fitness would return them,
+            the problem's `failure` for failure.
 
         Returns
         -------
@@ -228,8 +281,67 @@ class Evolution(Generic[P]):
         self.genomes, self.scores, self._bred = bred.genomes, scores, None
         self._record(bred, told)
         keys = [b"" if phenotype is None else phenotype.key for phenotype in bred.phenotypes]
-        self._ledger.add(bred.parents, bred.changed, merits(scores, partial_credit=True), keys)
+        ranked = merits(scores, True, self.problem.failure)
+        self._ledger.add(bred.parents, bred.changed, ranked, keys)
         return self.history[-1]
+
+    def run(
+        self,
+        after: Callable[[Generation], None] = lambda generation: None,  # noqa: ARG005
+        map: Callable[..., Iterable[Any]] = map,  # noqa: A002
+    ) -> Best[P]:
+        """Ask the fitness and be told until the evolution is finished; return the best program.
+
+        Where one fitness is not like the next (`Fitness.draws`), the best programs of the run are scored afresh at the
+        end, and the best of these is chosen: what looked best may have been lucky.
+
+        Parameters
+        ----------
+        after
+            Called with each generation's record.
+        map
+            What applies a function to each of a list, such as the ``map`` of an executor with many processes.
+
+        Raises
+        ------
+        InputError
+            If there is no fitness, it returns something else than numbers, or nothing that was bred had a phenotype.
+        """
+        if not isinstance(self.problem, FitnessProblem):
+            raise expected("run", f"a {type(self.problem).__name__}", "a fitness; otherwise ask and tell")
+        score = partial(self.problem.score, map=map)
+        while not self.finished:
+            after(self.tell(score(self.ask())))
+        if self.best.program is None:
+            raise self._no_phenotype(self.totals.evaluations)
+        if self.problem.rescored:
+            means = self.problem.afresh(self.contenders, self.seed, self.settings.generations + 1, map)
+            self.choose(self.contenders[int(np.argmin(means))])
+        return self.best
+
+    def _refuse_barren(self, bred: Bred[P]) -> None:
+        """Give up where nothing has a phenotype, instead of breeding on for ever without a word."""
+        if self._best is not None and self._best.program is not None:
+            return
+        if any(phenotype is not None for phenotype in bred.phenotypes):
+            self._barren = 0
+            return
+        self._barren += len(bred.genomes)
+        if self._barren >= BARREN:
+            self._bred = None
+            raise self._no_phenotype(self._barren, bred.genomes)
+
+    def _no_phenotype(self, n: int, genomes: Genomes | None = None) -> InputError:
+        mapped = self.mapper.map(self.genomes if genomes is None else genomes)
+        whole = np.flatnonzero(mapped.valid)
+        what = "genomes without a derivation that finishes"
+        if len(whole):
+            what = f"genomes without a phenotype, such as {mapped.text(int(whole[0]))[:60]!r}"
+        return expected(
+            f"grammar {self.mapper.grammar.source}",
+            f"{n:,} {what}",
+            "a grammar whose derivations finish and mean something to the problem",
+        )
 
     def _wants_drives(self, digest: bytes) -> bool:
         if digest not in self._cache:
@@ -285,7 +397,10 @@ class Evolution(Generic[P]):
             self.totals.steps + int(told["steps"].sum()),
         )
         programs = len({phenotype.digest for phenotype in bred.phenotypes if phenotype is not None})
-        self.history.append(summary(len(self.history), self.scores, programs, totals, self._wall_s()))
+        record = summary(
+            len(self.history), self.scores, programs, totals, self._wall_s(), self.problem.failure
+        )
+        self.history.append(record)
         self._patience.see(self.history[-1].best)
         if self.problem.rescored:
             self._keep_contenders(bred)
@@ -299,7 +414,7 @@ class Evolution(Generic[P]):
     def _keep_contenders(self, bred: Bred[P]) -> None:
         """Keep the best programs so far, with what is known of them now."""
         for i, phenotype in enumerate(bred.phenotypes):
-            if phenotype is not None and self.scores["merit"][i] < UNSOLVED:
+            if phenotype is not None and self.scores["merit"][i] < self.problem.failure:
                 score, known = self.scores[i : i + 1].copy(), self._contenders.get(phenotype.digest)
                 found = known or Best(bred.genomes[i].copy(), score, self.generation, phenotype.program)
                 self._contenders[phenotype.digest] = replace(found, score=score)
@@ -308,9 +423,11 @@ class Evolution(Generic[P]):
         ranked = sorted(self._contenders, key=lambda digest: _rank(self._contenders[digest].score[0]))
         self._contenders = {digest: self._contenders[digest] for digest in ranked[:CONTENDERS]}
 
-    def _dump_contenders(self) -> tuple[Bytes, Scores, npt.NDArray[np.int64]]:
+    def _dump_contenders(self) -> tuple[Genomes, Scores, npt.NDArray[np.int64]]:
         kept = list(self._contenders.values())
-        genomes = np.array([one.genome for one in kept], np.uint8).reshape(-1, self.settings.codons)
+        genomes = np.array([one.genome for one in kept], self.genomes.dtype).reshape(
+            -1, self.genomes.shape[1]
+        )
         scores = np.concatenate([self.scores[:0], *(one.score for one in kept)])
         return genomes, scores, np.array([one.generation for one in kept], np.int64)
 
@@ -345,8 +462,9 @@ def run(
 
 def rehearse(settings: EvolutionSettings, mapper: Mapper, problem: Problem[P]) -> None:
     """Run two small generations that score nothing, so that all compiled code is there before the clock runs."""
-    small = settings.model_copy(update={"population": settings.elites + 4, "generations": 1})
-    run(Evolution(small, mapper, problem, 0), lambda asked: problem.failed(len(asked)))
+    elites = min(settings.elites, 1)
+    small = settings.model_copy(update={"population": elites + 4, "elites": elites, "generations": 1})
+    run(Evolution(mapper, problem, small, 0), lambda asked: problem.failed(len(asked)))
 
 
 def _rank(score: Any) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Breeding: the settings' operators, put together in the order the paper lists them."""
+"""Breeding: operators put together in the order the paper lists them."""
 
 from __future__ import annotations
 
@@ -9,28 +9,19 @@ from typing import Generic
 import numpy as np
 import numpy.typing as npt
 
-from gecar.evolution.crossover import OnePoint, Subtree, VariableOnePoint
-from gecar.evolution.initialisation import initialise
-from gecar.evolution.lineage import CREEP, CROSSOVER, DUPLICATION, MUTATION, differs
-from gecar.evolution.mutation import Creep, Duplicate, Flip, Renew
+from gecar.evolution.crossover import Genomes
+from gecar.evolution.lineage import differs
+from gecar.evolution.operators import Operators, Variation, any_fresh, change_of
 from gecar.evolution.phenotypes import Phenotype, Phenotypes
 from gecar.evolution.problem import P, Problem
 from gecar.evolution.scores import Scores, merits
-from gecar.evolution.selection import deviations, lexicase, tournament
+from gecar.evolution.selection import Population
 from gecar.evolution.settings import EvolutionSettings
 from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams, spawn
 
 Bytes = npt.NDArray[np.uint8]
 Int32s = npt.NDArray[np.int32]
-Operator = Callable[[Bytes, Mapper, Streams], Bytes]
-"""Genomes (children, codons), what they derive, and a stream for each; the genomes may be changed in place."""
-
-
-GROWN = 0.7
-"""Probability that a child of a stagnant population has one of its subtrees duplicated."""
-LONGEST = 54
-"""Most codons of such a child: six conditions of Table 3, 24 lines. Without a limit winners had up to 18 conditions."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +41,13 @@ class Bred(Generic[P]):
         Which operators changed what the genome derives (population,), as bits; see `gecar.evolution.lineage`.
     """
 
-    genomes: Bytes
+    genomes: Genomes
     phenotypes: list[Phenotype[P] | None]
     parents: Int32s
     changed: Bytes
 
 
-Drawn = tuple[Bytes, Int32s, Bytes]
+Drawn = tuple[Genomes, Int32s, Bytes]
 """Genomes, parents and changes, as in `Bred`."""
 
 
@@ -66,7 +57,9 @@ class Breeder(Generic[P]):
     Parameters
     ----------
     settings
-        Which operators.
+        Sizes, and what is done about duplicates.
+    operators
+        What it breeds with.
     mapper
         What genomes derive.
     problem
@@ -75,16 +68,19 @@ class Breeder(Generic[P]):
         The run's.
     """
 
-    def __init__(self, settings: EvolutionSettings, mapper: Mapper, problem: Problem[P], seed: int) -> None:
-        self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
+    def __init__(
+        self,
+        settings: EvolutionSettings,
+        operators: Operators,
+        mapper: Mapper,
+        problem: Problem[P],
+        seed: int,
+    ) -> None:
+        self.settings, self.operators = settings, operators
+        self.mapper, self.problem, self.seed = mapper, problem, seed
         self._phenotypes = Phenotypes(mapper, problem)
-        self._operators = _operators(settings)
-        self._growth: list[tuple[int, Operator]] = [
-            (DUPLICATION, Duplicate(GROWN, LONGEST)),
-            *_creep(settings),
-        ]
 
-    def read(self, genomes: Bytes) -> list[Phenotype[P] | None]:
+    def read(self, genomes: Genomes) -> list[Phenotype[P] | None]:
         """Return what genomes derive."""
         return self._phenotypes.read(genomes)
 
@@ -94,14 +90,14 @@ class Breeder(Generic[P]):
 
         def draw(attempt: int) -> Drawn:
             n = settings.population
-            genomes = initialise(settings, self.mapper, spawn(self.seed, generation, attempt, n))
+            genomes = self.operators.initialise(self.mapper, spawn(self.seed, generation, attempt, n))
             return genomes, np.full((n, 2), -1, np.int32), np.zeros(n, np.uint8)
 
         return self._without_duplicates(draw, 0, known)
 
     def next(
         self,
-        genomes: Bytes,
+        genomes: Genomes,
         scores: Scores,
         generation: int,
         known: Callable[[bytes], bool],
@@ -120,18 +116,20 @@ class Breeder(Generic[P]):
         grown
             Whether children have a subtree duplicated instead of being crossed and mutated.
         """
-        operators = self._growth if grown else self._operators
+        operators = self.operators.grow if grown else self.operators.vary
+        fresh = any_fresh(self.operators.vary)
         n_elites = self.settings.elites
-        ranked = merits(scores, self.problem.partial_credit)
+        ranked = merits(scores, self.problem.partial_credit, self.problem.failure)
+        population = Population(genomes, scores, ranked, self.problem.cases(scores))
         elites = np.argsort(ranked, kind="stable")[:n_elites].astype(np.int32)
 
         def draw(attempt: int) -> Drawn:
             n = self.settings.population - n_elites
             streams = spawn(self.seed, generation, attempt, n + n % 2)
-            chosen = self._select(ranked, scores, streams)
+            chosen = self.operators.select(population, streams)
             children, changed = self._vary(operators, genomes[chosen], streams)
             pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
-            if self.settings.mutation == "renew":
+            if fresh:
                 pairs[:] = -1
             return (
                 np.concatenate([genomes[elites], children[:n]]),
@@ -142,22 +140,16 @@ class Breeder(Generic[P]):
         return self._without_duplicates(draw, n_elites, known)
 
     def _vary(
-        self, operators: list[tuple[int, Operator]], children: Bytes, streams: Streams
-    ) -> tuple[Bytes, Bytes]:
+        self, operators: tuple[Variation, ...], children: Genomes, streams: Streams
+    ) -> tuple[Genomes, Bytes]:
         """Return the children as the operators leave them, and which operators changed what they derive."""
         changed, before = np.zeros(len(children), np.uint8), self.mapper.map(children)
-        for bit, operator in operators:
+        for operator in operators:
             children = operator(children, self.mapper, streams)
             after = self.mapper.map(children)
-            changed += np.uint8(bit) * differs(before, after)
+            changed |= change_of(operator) * differs(before, after)
             before = after
         return children, changed
-
-    def _select(self, ranked: npt.NDArray[np.float64], scores: Scores, streams: Streams) -> Int32s:
-        if self.settings.selection == "tournament":
-            return tournament(ranked, self.settings.tournament, streams)
-        cases = self.problem.cases(scores)
-        return lexicase(cases, deviations(cases), streams)
 
     def _without_duplicates(
         self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
@@ -173,29 +165,10 @@ class Breeder(Generic[P]):
             if not again:
                 break
             for kept, drawn in zip((genomes, parents, changed), draw(attempt), strict=True):
-                kept[again] = drawn[again]  # type: ignore[index]
+                kept[again] = drawn[again]
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
         return Bred(genomes, phenotypes, parents, changed)
-
-
-def _operators(settings: EvolutionSettings) -> list[tuple[int, Operator]]:
-    """Return crossover and mutation as the settings have them, each with its bit in a lineage."""
-    if settings.mutation == "renew":
-        return [(MUTATION, Renew(settings))]
-    crossover: dict[str, Operator] = {
-        "one_point": OnePoint(settings.crossover_rate),
-        "one_point_used": OnePoint(settings.crossover_rate, within_used=True),
-        "variable_one_point": VariableOnePoint(settings.crossover_rate),
-        "subtree": Subtree(settings.crossover_rate),
-    }
-    rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
-    flip = Flip(rate, within_used=settings.mutation != "codon")
-    return [(CROSSOVER, crossover[settings.crossover]), (MUTATION, flip), *_creep(settings)]
-
-
-def _creep(settings: EvolutionSettings) -> list[tuple[int, Operator]]:
-    return [(CREEP, Creep(settings.creep_rate, settings.creep_most))] if settings.creep_rate else []
 
 
 def _duplicates(

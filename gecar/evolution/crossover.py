@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
-from gecar.language.mapping import Mapped, Mapper
+from gecar.evolution.lineage import CROSSOVER
+from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams, below, uniform
 
 Bools = npt.NDArray[np.bool_]
-Bytes = npt.NDArray[np.uint8]
+Genomes = npt.NDArray[np.integer[Any]]
+"""Codons, of the mapper's `codon_type` (genomes, codons)."""
 Int32s = npt.NDArray[np.int32]
 Int64s = npt.NDArray[np.int64]
 
 
-def used_codons(mapped: Mapped, codons: int) -> Int32s:
+def used_codons(genomes: Genomes, mapper: Mapper) -> Int32s:
     """Return how many codons of each genome its derivation reads (genomes,)."""
-    return np.minimum(mapped.used, codons)
+    return np.minimum(mapper.map(genomes).used, lengths(genomes, mapper))
+
+
+def lengths(genomes: Genomes, mapper: Mapper) -> Int32s:
+    """Return how many codons each genome has (genomes,)."""
+    if not mapper.options.variable_length:
+        return np.full(len(genomes), genomes.shape[1], np.int32)
+    ended = genomes < 0
+    return np.where(ended.any(axis=1), ended.argmax(axis=1), genomes.shape[1]).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -36,19 +47,24 @@ class OnePoint:
 
     rate: float
     within_used: bool = False
+    change = CROSSOVER
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    @property
+    def linear(self) -> bool:
+        """Whether codons must be read from the first on."""
+        return self.within_used
+
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
-        codons = genomes.shape[1]
-        reach = np.full(len(genomes), codons, np.int32)
+        reach = lengths(genomes, mapper)
         if self.within_used:
-            reach = used_codons(mapper.map(genomes), codons)
+            reach = used_codons(genomes, mapper)
         _swap_tails(genomes, reach, self.rate, streams)
         return genomes
 
 
 @compiled
-def _swap_tails(genomes: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+def _swap_tails(genomes: Genomes, reach: Int32s, rate: float, streams: Streams) -> None:
     for i in range(0, genomes.shape[0] - 1, 2):
         shared = min(reach[i], reach[i + 1])
         if uniform(streams[i]) < rate and shared > 1:
@@ -60,7 +76,8 @@ def _swap_tails(genomes: Bytes, reach: Int32s, rate: float, streams: Streams) ->
 class VariableOnePoint:
     """Genomes exchange what stands behind a point of its own in either, within what it uses (PonyGE2's default).
 
-    What grows beyond the genome is cut, what is missing at its end stays as it was.
+    What grows beyond the genome's room is cut. What is missing at its end stays as it was; genomes of variable length
+    get shorter.
 
     Attributes
     ----------
@@ -69,24 +86,28 @@ class VariableOnePoint:
     """
 
     rate: float
+    change = CROSSOVER
+    linear = True
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
         children = genomes.copy()
-        _swap_any_tails(
-            genomes, children, used_codons(mapper.map(genomes), genomes.shape[1]), self.rate, streams
-        )
+        reach = used_codons(genomes, mapper)
+        _swap_any_tails(genomes, children, reach, self.rate, mapper.options.variable_length, streams)
         return children
 
 
 @compiled
-def _swap_any_tails(genomes: Bytes, children: Bytes, reach: Int32s, rate: float, streams: Streams) -> None:
+def _swap_any_tails(
+    genomes: Genomes, children: Genomes, reach: Int32s, rate: float, variable: bool, streams: Streams
+) -> None:
     codons = genomes.shape[1]
     for i in range(0, genomes.shape[0] - 1, 2):
         if uniform(streams[i]) < rate and reach[i] > 0 and reach[i + 1] > 0:
             a, b = 1 + below(streams[i], reach[i]), 1 + below(streams[i], reach[i + 1])
-            _splice(children[i], genomes[i], a, codons, genomes[i + 1], b, min(codons, b + codons - a))
-            _splice(children[i + 1], genomes[i + 1], b, codons, genomes[i], a, min(codons, a + codons - b))
+            end_a, end_b = min(codons, a + codons - b), min(codons, b + codons - a)
+            _splice(children[i], genomes[i], a, codons, genomes[i + 1], b, end_b, variable)
+            _splice(children[i + 1], genomes[i + 1], b, codons, genomes[i], a, end_a, variable)
 
 
 @dataclass(frozen=True)
@@ -100,27 +121,38 @@ class Subtree:
     """
 
     rate: float
+    change = CROSSOVER
+    linear = True
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
         mapped = mapper.map(genomes)
         children = genomes.copy()
-        whole = mapped.valid & (mapped.used <= genomes.shape[1])
+        whole = mapped.valid & (mapped.used <= lengths(genomes, mapper))
         _swap_subtrees(
-            genomes, children, whole, mapped.offsets, mapped.symbols, mapped.subtree_ends, self.rate, streams
+            genomes,
+            children,
+            whole,
+            mapped.offsets,
+            mapped.symbols,
+            mapped.subtree_ends,
+            self.rate,
+            mapper.options.variable_length,
+            streams,
         )
         return children
 
 
 @compiled
 def _swap_subtrees(
-    genomes: Bytes,
-    children: Bytes,
+    genomes: Genomes,
+    children: Genomes,
     whole: Bools,
     offsets: Int64s,
     symbols: Int32s,
     ends: Int32s,
     rate: float,
+    variable: bool,
     streams: Streams,
 ) -> None:
     codons = genomes.shape[1]
@@ -135,8 +167,8 @@ def _swap_subtrees(
         begin_a, end_a, begin_b, end_b = a - first, ends[a], b - second, ends[b]
         growth = (end_b - begin_b) - (end_a - begin_a)
         if second - first + growth <= codons and offsets[i + 2] - second - growth <= codons:
-            _splice(children[i], genomes[i], begin_a, end_a, genomes[i + 1], begin_b, end_b)
-            _splice(children[i + 1], genomes[i + 1], begin_b, end_b, genomes[i], begin_a, end_a)
+            _splice(children[i], genomes[i], begin_a, end_a, genomes[i + 1], begin_b, end_b, variable)
+            _splice(children[i + 1], genomes[i + 1], begin_b, end_b, genomes[i], begin_a, end_a, variable)
 
 
 @compiled
@@ -157,10 +189,12 @@ def _draw_alike(symbols: Int32s, first: int, last: int, symbol: int, streams: St
 
 
 @compiled
-def _splice(child: Bytes, own: Bytes, begin: int, end: int, donor: Bytes, first: int, last: int) -> None:
+def _splice(
+    child: Genomes, own: Genomes, begin: int, end: int, donor: Genomes, first: int, last: int, variable: bool
+) -> None:
     """Write own codons with ``begin`` up to ``end`` replaced by the donor's ``first`` up to ``last``.
 
-    The codons behind move along; what is missing at the genome's end stays as it was.
+    The codons behind move along; what is missing at the genome's end stays as it was, or ends it if it may vary.
     """
     at = begin
     for k in range(first, last):
@@ -171,3 +205,6 @@ def _splice(child: Bytes, own: Bytes, begin: int, end: int, donor: Bytes, first:
             break
         child[at] = own[k]
         at += 1
+    if variable:
+        for k in range(at, own.size):
+            child[k] = -1

@@ -19,8 +19,9 @@ class Generation(NamedTuple):
     generation
         0 is the first population.
     best, mean
-        Merit over the population, see `gecar.evolution.scores.FIELDS`; 10^4 is a program that fails. Of robot programs
-        it is fitness of eq. 1 [s], or with drawn conditions the median time to GOAL of what arrives often enough.
+        Merit over the population, lower is better, see `gecar.evolution.scores.FIELDS`; a program that fails has the
+        problem's `failure`, inf unless it says otherwise. Of robot programs it is fitness of eq. 1 [s], 10^4 for
+        failure, or with drawn conditions the median time to GOAL of what arrives often enough.
     valid, distinct
         Shares of the population that map to a program, and of different programs in it.
     evaluations
@@ -65,7 +66,14 @@ class Totals:
     steps: int = 0
 
 
-def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall_s: float) -> Generation:
+def summary(
+    generation: int,
+    scores: Scores,
+    programs: int,
+    totals: Totals,
+    wall_s: float,
+    failure: float = UNSOLVED,
+) -> Generation:
     """Sum up a generation.
 
     Parameters
@@ -80,9 +88,11 @@ def summary(generation: int, scores: Scores, programs: int, totals: Totals, wall
         Spent so far.
     wall_s
         Time since the run began [s].
+    failure
+        Merit of a program that fails.
     """
     fitness = scores["merit"]
-    solved = fitness < UNSOLVED
+    solved = fitness < failure
     return Generation(
         generation=generation,
         best=float(fitness.min()),
@@ -110,23 +120,25 @@ class Patience:
     ----------
     generations
         How many, once it holds a success; without one it has `WITHOUT_SUCCESS` times as many. 0 is without end.
+    failure
+        Merit of a program that fails.
     """
 
-    def __init__(self, generations: int) -> None:
-        self._limit = generations
-        self._best, self._idle = UNSOLVED, 0
+    def __init__(self, generations: int, failure: float = UNSOLVED) -> None:
+        self._limit, self._failure = generations, failure
+        self._best, self._idle = failure, 0
         self.restarts = 0
 
     @property
     def at_its_end(self) -> bool:
         """Whether the population is stagnant, and gives way to another."""
-        limit = self._limit if self._best < UNSOLVED else WITHOUT_SUCCESS * self._limit
+        limit = self._limit if self._best < self._failure else WITHOUT_SUCCESS * self._limit
         return 0 < limit <= self._idle
 
     def see(self, best: float) -> None:
         """Take the best merit of a generation; after an end it is that of a new population."""
         if self.at_its_end:
-            self._best, self._idle = UNSOLVED, 0
+            self._best, self._idle = self._failure, 0
             self.restarts += 1
         if best < self._best:
             self._best, self._idle = best, 0

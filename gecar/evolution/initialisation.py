@@ -3,29 +3,133 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.evolution.settings import EvolutionSettings
+from gecar.errors import expected
+from gecar.evolution.crossover import Genomes
 from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams
 
-Bytes = npt.NDArray[np.uint8]
 Rng = np.random.Generator
 
 
-def initialise(settings: EvolutionSettings, mapper: Mapper, streams: Streams) -> Bytes:
-    """Return new random genomes, one from each stream (streams, codons)."""
-    genomes = np.empty((len(streams), settings.codons), np.uint8)
-    write = _PLANS[settings.initialisation]
-    for i, seed in enumerate(streams["stream"].tolist()):
+class Initialisation(Protocol):
+    """Makes first genomes."""
+
+    def __call__(self, mapper: Mapper, streams: Streams) -> Genomes:
+        """Return new genomes, one from each stream (streams, codons)."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Random codons.
+
+    Attributes
+    ----------
+    codons
+        Length of a genome; where genomes differ in length, the greatest.
+    shortest
+        Least length, where genomes differ in length; None: all begin with the greatest.
+    """
+
+    codons: int
+    shortest: int | None = None
+
+    def __call__(self, mapper: Mapper, streams: Streams) -> Genomes:
+        """Return new genomes (streams, codons)."""
+        return _random(mapper, streams, self.codons, self._length)
+
+    def _length(self, genome: Genomes, mapper: Mapper, rng: Rng) -> int:  # noqa: ARG002
+        return self.codons if self.shortest is None else int(rng.integers(self.shortest, self.codons + 1))
+
+
+@dataclass(frozen=True)
+class Sensible:
+    """Derivation trees grown or full, of depths from the shallowest possible up (Ryan and Azad 2003).
+
+    Attributes
+    ----------
+    codons
+        Length of a genome; where genomes differ in length, the greatest.
+    depth
+        Greatest depth.
+    tail
+        Where genomes differ in length: random codons behind those a tree needs, as a share of these; None: to the end.
+    """
+
+    codons: int
+    depth: int
+    tail: float | None = None
+
+    def __call__(self, mapper: Mapper, streams: Streams) -> Genomes:
+        """Return new genomes (streams, codons)."""
+        return _spelled(mapper, streams, self.codons, self.tail, self._choices)
+
+    def _choices(self, plan: Plan) -> list[int]:
+        return _sensible(plan, self.depth, self.codons)
+
+
+@dataclass(frozen=True)
+class Ptc2:
+    """Derivation trees of drawn sizes, expanded at random places (Luke 2000, Nicolau 2017).
+
+    Attributes
+    ----------
+    codons
+        Length of a genome; where genomes differ in length, the greatest.
+    expansions
+        Most codons a tree aims at.
+    tail
+        As in `Sensible`.
+    """
+
+    codons: int
+    expansions: int
+    tail: float | None = None
+
+    def __call__(self, mapper: Mapper, streams: Streams) -> Genomes:
+        """Return new genomes (streams, codons)."""
+        return _spelled(mapper, streams, self.codons, self.tail, self._choices)
+
+    def _choices(self, plan: Plan) -> list[int]:
+        return _ptc2(plan, self.expansions)
+
+
+def _spelled(
+    mapper: Mapper,
+    streams: Streams,
+    codons: int,
+    tail: float | None,
+    choices_of: Callable[[Plan], list[int]],
+) -> Genomes:
+    """Return genomes that begin with the codons of a tree."""
+    if not mapper.linear:
+        raise expected("initialisation", "trees for a mapper of genes", "Uniform, or one of your own")
+
+    def write(genome: Genomes, mapper: Mapper, rng: Rng) -> int:
+        # The ramp over sizes goes by the stream, not the place, so that an individual needs no other.
+        choices = choices_of(Plan(mapper, rng))[:codons]
+        genome[: len(choices)] = choices
+        return codons if tail is None else min(codons, len(choices) + round(tail * len(choices)))
+
+    return _random(mapper, streams, codons, write)
+
+
+def _random(
+    mapper: Mapper, streams: Streams, codons: int, write: Callable[[Genomes, Mapper, Rng], int]
+) -> Genomes:
+    """Return random genomes, after something was written into each that says its length."""
+    genomes: Genomes = np.empty((len(streams), codons), mapper.options.codon_type)
+    for genome, seed in zip(genomes, streams["stream"].tolist(), strict=True):
         rng = np.random.default_rng(seed)
-        genomes[i] = rng.integers(0, 256, settings.codons, np.uint8)
-        if write is not None:
-            # The ramp over sizes goes by the stream, not the place, so that an individual needs no other.
-            choices = write(settings, Plan(mapper, rng))[: settings.codons]
-            genomes[i, : len(choices)] = choices
+        genome[:] = rng.integers(0, mapper.options.codon_size, codons, genomes.dtype)
+        length = write(genome, mapper, rng)
+        if mapper.options.variable_length:
+            genome[length:] = -1
     return genomes
 
 
@@ -42,12 +146,13 @@ class Plan:
 
     def __init__(self, mapper: Mapper, rng: Rng) -> None:
         self.grammar, self.reads, self.rng = mapper.grammar, mapper.tables.reads, rng
+        self.size = mapper.options.codon_size
         self._shortest: dict[int, int] = {}
 
     def options(self, symbol: int) -> npt.NDArray[np.intp]:
         """Productions of a nonterminal that a codon can choose."""
         first = self.grammar.first_production
-        return np.arange(first[symbol], min(first[symbol + 1], first[symbol] + 256))
+        return np.arange(first[symbol], min(first[symbol + 1], first[symbol] + self.size))
 
     def shallowest(self, symbol: int) -> npt.NDArray[np.intp]:
         """Productions that end soonest."""
@@ -78,18 +183,18 @@ class Plan:
             int(self.grammar.n_choices[symbol]),
             production - int(self.grammar.first_production[symbol]),
         )
-        return [choice + n * int(self.rng.integers((255 - choice) // n + 1))]
+        return [choice + n * int(self.rng.integers((self.size - 1 - choice) // n + 1))]
 
 
-def _sensible(settings: EvolutionSettings, plan: Plan) -> list[int]:
+def _sensible(plan: Plan, most_depth: int, codons: int) -> list[int]:
     """Grow a tree, or a full one, to a depth between the shallowest possible and the greatest allowed."""
     shallowest = int(plan.grammar.minimum_depth[0])
-    depth = int(plan.rng.integers(shallowest, max(settings.initial_depth, shallowest) + 1))
+    depth = int(plan.rng.integers(shallowest, max(most_depth, shallowest) + 1))
     full = bool(plan.rng.integers(2))
     while True:
-        codons = _tree(plan, depth, full, settings.codons)
-        if len(codons) <= settings.codons or depth <= shallowest:
-            return codons
+        choices = _tree(plan, depth, full, codons)
+        if len(choices) <= codons or depth <= shallowest:
+            return choices
         depth -= 1  # too large for the genome
 
 
@@ -108,9 +213,9 @@ def _tree(plan: Plan, depth: int, full: bool, most: int) -> list[int]:
     return codons
 
 
-def _ptc2(settings: EvolutionSettings, plan: Plan) -> list[int]:
+def _ptc2(plan: Plan, expansions: int) -> list[int]:
     """Expand random open nonterminals until the tree will have the size drawn, then end each the shortest way."""
-    target = int(plan.rng.integers(1, settings.initial_expansions + 1))
+    target = int(plan.rng.integers(1, expansions + 1))
     chosen: dict[int, int] = {}  # production of each node
     symbols, below, waiting, read = [0], {0: range(0)}, [0], 0
     while waiting:
@@ -146,10 +251,3 @@ def _leftmost(plan: Plan, symbols: list[int], chosen: dict[int, int], below: dic
         codons += plan.codon(symbols[node], chosen[node])
         waiting += reversed(below[node])
     return codons
-
-
-_PLANS: dict[str, Callable[[EvolutionSettings, Plan], list[int]] | None] = {
-    "uniform": None,
-    "sensible": _sensible,
-    "ptc2": _ptc2,
-}

@@ -28,8 +28,8 @@ INDIVIDUAL = np.dtype(
 )
 """``parent``, ``mate``: places in the generation before, as in `gecar.evolution.breeding.Bred`. ``merit``: time to GOAL
 [s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: what made its program another than its
-parent's, `CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`. ``codons``: how many are kept of it; none if nothing
-changed it."""
+parent's, `CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`. ``codons``: bytes kept of its codons, one each unless they
+are larger; none if nothing changed it."""
 
 MAX_BYTES = 32_000_000
 """What is kept of a run at most, 5,000 generations of 200 and more; beyond it nothing is, so that memory stays flat."""
@@ -38,7 +38,8 @@ MAX_BYTES = 32_000_000
 def differs(before: Mapped, after: Mapped) -> Bools:
     """Return which genomes derive another program than before (genomes,)."""
     one, other = before.choices.tobytes(), after.choices.tobytes()
-    ends, other_ends = before.offsets.tolist(), after.offsets.tolist()
+    size = before.choices.itemsize
+    ends, other_ends = (size * before.offsets).tolist(), (size * after.offsets).tolist()
     pieces = zip(ends[:-1], ends[1:], other_ends[:-1], other_ends[1:], strict=True)
     return np.array([one[a:b] != other[c:d] for a, b, c, d in pieces])
 
@@ -75,7 +76,9 @@ class Ledger:
         written = [key if is_new else b"" for key, is_new in zip(keys, new.tolist(), strict=True)]
         rows = np.zeros(len(keys), INDIVIDUAL)
         rows["parent"], rows["mate"] = parents.T
-        rows["merit"], rows["changed"] = merits, changed
+        rows["changed"] = changed
+        with np.errstate(over="ignore"):  # beyond float32 a merit is as bad as inf
+            rows["merit"] = merits
         rows["codons"] = [len(key) for key in written]
         self._append(rows.tobytes() + b"".join(written))
 

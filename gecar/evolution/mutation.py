@@ -11,15 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
-from gecar.evolution.crossover import used_codons
-from gecar.evolution.initialisation import initialise
-from gecar.evolution.settings import EvolutionSettings
+from gecar.evolution.crossover import Genomes, lengths, used_codons
+from gecar.evolution.initialisation import Initialisation
+from gecar.evolution.lineage import CREEP, DUPLICATION, MUTATION
 from gecar.language.grammar import Grammar, Rule
 from gecar.language.mapping import Mapper
 from gecar.random_streams import Streams, below, uniform
 
 Bools = npt.NDArray[np.bool_]
-Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
 Int32s = npt.NDArray[np.int32]
 Int64s = npt.NDArray[np.int64]
@@ -27,7 +26,7 @@ Int64s = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Flip:
-    """Codons are drawn anew from 0..255.
+    """Codons are drawn anew, each codon there is as likely as the others.
 
     Attributes
     ----------
@@ -39,35 +38,42 @@ class Flip:
 
     rate: float | None
     within_used: bool = False
+    change = MUTATION
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    @property
+    def linear(self) -> bool:
+        """Whether codons must be read from the first on."""
+        return self.within_used
+
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
-        codons = genomes.shape[1]
-        reach = np.full(len(genomes), codons, np.int32)
+        reach = lengths(genomes, mapper)
         if self.within_used:
-            reach = used_codons(mapper.map(genomes), codons)
+            reach = used_codons(genomes, mapper)
         rates = 1.0 / np.maximum(reach, 1) if self.rate is None else np.full(len(genomes), self.rate)
-        _flip(genomes, reach, rates, streams)
+        _flip(genomes, reach, rates, mapper.options.codon_size, streams)
         return genomes
 
 
 @compiled
-def _flip(genomes: Bytes, reach: Int32s, rates: Floats, streams: Streams) -> None:
+def _flip(genomes: Genomes, reach: Int32s, rates: Floats, size: int, streams: Streams) -> None:
     for i in range(genomes.shape[0]):
         for k in range(reach[i]):
             if uniform(streams[i]) < rates[i]:
-                genomes[i, k] = below(streams[i], 256)
+                genomes[i, k] = below(streams[i], size)
 
 
 @dataclass(frozen=True)
 class Renew:
     """Every child is a new random individual."""
 
-    settings: EvolutionSettings
+    initialise: Initialisation
+    change = MUTATION
+    fresh = True
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:  # noqa: ARG002
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:  # noqa: ARG002
         """Return the children (genomes, codons)."""
-        return initialise(self.settings, mapper, streams)
+        return self.initialise(mapper, streams)
 
 
 class Scale(NamedTuple):
@@ -92,11 +98,11 @@ class Scale(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def _scale(grammar: Grammar) -> Scale:
+def _scale(grammar: Grammar, size: int) -> Scale:
     values = [_numbers(rule) for rule in grammar.rules]
     orders = [np.argsort(v, kind="stable") for v in values]
     ranks = [np.argsort(order, kind="stable") for order in orders]
-    numeric = np.array([not np.isnan(v).any() and 1 < len(v) <= 256 for v in values])
+    numeric = np.array([not np.isnan(v).any() and 1 < len(v) <= size for v in values])
     rank, at_rank = (np.concatenate(parts).astype(np.int32) for parts in (ranks, orders))
     return Scale(numeric, rank, at_rank, grammar.first_production)
 
@@ -127,20 +133,33 @@ class Creep:
 
     rate: float
     most: float = math.inf
+    change = CREEP
+    linear = True
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
         mapped = mapper.map(genomes)
-        _creep(genomes, mapped.offsets, mapped.symbols, _scale(mapper.grammar), self.rate, self.most, streams)
+        size = mapper.options.codon_size
+        scale = _scale(mapper.grammar, size)
+        _creep(genomes, mapped.offsets, mapped.symbols, scale, self.rate, self.most, size, streams)
         return genomes
 
 
 @compiled
 def _creep(
-    genomes: Bytes, offsets: Int64s, symbols: Int32s, scale: Scale, rate: float, most: float, streams: Streams
+    genomes: Genomes,
+    offsets: Int64s,
+    symbols: Int32s,
+    scale: Scale,
+    rate: float,
+    most: float,
+    size: int,
+    streams: Streams,
 ) -> None:
     for i in range(genomes.shape[0]):
         read = min(offsets[i + 1] - offsets[i], genomes.shape[1])
+        while read > 0 and genomes[i, read - 1] < 0:  # read again from the first on: the genome is shorter
+            read -= 1
         numbers = 0
         for k in range(read):
             numbers += scale.numeric[symbols[offsets[i] + k]]
@@ -154,7 +173,7 @@ def _creep(
                 rank = scale.rank[first + codon % n]
                 rank = rank + step if 0 <= rank + step < n else rank - step
                 moved = codon - codon % n + scale.at_rank[first + rank]
-                genomes[i, k] = moved if moved < 256 else moved - n
+                genomes[i, k] = moved if moved < size else moved - n
 
 
 @dataclass(frozen=True)
@@ -174,11 +193,13 @@ class Duplicate:
 
     rate: float
     longest: int
+    change = DUPLICATION
+    linear = True
 
-    def __call__(self, genomes: Bytes, mapper: Mapper, streams: Streams) -> Bytes:
+    def __call__(self, genomes: Genomes, mapper: Mapper, streams: Streams) -> Genomes:
         """Return the children (genomes, codons)."""
         mapped = mapper.map(genomes)
-        whole = mapped.valid & (mapped.used <= genomes.shape[1])
+        whole = mapped.valid & (mapped.used <= lengths(genomes, mapper))
         longest = min(self.longest, genomes.shape[1])
         twice = _twice(mapper.grammar)
         _duplicate(
@@ -208,7 +229,7 @@ def _twice(grammar: Grammar) -> Int32s:
 
 @compiled
 def _duplicate(
-    genomes: Bytes,
+    genomes: Genomes,
     whole: Bools,
     offsets: Int64s,
     symbols: Int32s,

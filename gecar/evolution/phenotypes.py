@@ -1,16 +1,15 @@
-"""From genomes to programs, each read once however many individuals share it."""
+"""From genomes to phenotypes, each read once however many individuals share it."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
-import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.problem import P, Problem
-from gecar.language.mapping import Mapped, Mapper
+from gecar.language.mapping import Derivation, Mapped, Mapper
 
 DIGEST_BYTES = 16
 
@@ -40,7 +39,7 @@ class Phenotypes(Generic[P]):
         self._now: dict[bytes, Phenotype[P] | None] = {}
         self._before: dict[bytes, Phenotype[P] | None] = {}
 
-    def read(self, genomes: npt.NDArray[np.uint8]) -> list[Phenotype[P] | None]:
+    def read(self, genomes: npt.NDArray[Any]) -> list[Phenotype[P] | None]:
         """Return each genome's phenotype; None where it maps to no program."""
         mapped = self.mapper.map(genomes)
         return [self._phenotype(mapped, i) if mapped.valid[i] else None for i in range(len(mapped))]
@@ -56,8 +55,10 @@ class Phenotypes(Generic[P]):
         return self._now[key]
 
     def _read(self, mapped: Mapped, i: int) -> Phenotype[P] | None:
-        program = self.problem.read(mapped, i)
+        derivation = Derivation(mapped, i)
+        program = self.problem.read(derivation)
         if program is None:
             return None
-        digest = hashlib.blake2b(self.problem.meaning(program), digest_size=DIGEST_BYTES).digest()
+        meaning = self.problem.meaning(program, derivation)
+        digest = hashlib.blake2b(meaning, digest_size=DIGEST_BYTES).digest()
         return Phenotype(program, mapped.key(i), digest)

@@ -1,8 +1,13 @@
-"""Problems: what is evolved. An evolution asks its problem what a derivation means and how scores compare."""
+"""Problems: what is evolved. An evolution asks its problem what a derivation means and how scores compare.
+
+A phenotype and a fitness make one: `gecar.evolution.fitness`. What wants more, such as scores with fields of their own,
+is a subclass of `Problem`, as `gecar.search.programs` has it for the robot.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import math
 from abc import ABC, abstractmethod
 from typing import Any, Generic, TypeVar
 
@@ -10,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import expected
-from gecar.evolution.scores import FIELDS, INVALID, UNSOLVED, Floats, Scores
-from gecar.language.mapping import Mapped
+from gecar.evolution.scores import FIELDS, INVALID, Floats, Scores
+from gecar.language.mapping import Derivation
 
 P = TypeVar("P")
 
@@ -30,6 +35,11 @@ class Problem(ABC, Generic[P]):
         return np.dtype(list(FIELDS))
 
     @property
+    def failure(self) -> float:
+        """Merit of a program that fails; every success has a lower one."""
+        return math.inf
+
+    @property
     def partial_credit(self) -> bool:
         """Whether selection prefers failures with a greater share."""
         return False
@@ -45,28 +55,42 @@ class Problem(ABC, Generic[P]):
         return 0
 
     @abstractmethod
-    def read(self, mapped: Mapped, i: int) -> P | None:
-        """Return genome i's program; None where its derivation is none."""
+    def read(self, derivation: Derivation) -> P | None:
+        """Return the program that was derived; None where the derivation is none."""
 
     @abstractmethod
-    def meaning(self, program: P) -> bytes:
+    def meaning(self, program: P, derivation: Derivation) -> bytes:
         """Return bytes that are equal for programs that do the same: they share their scores."""
 
-    def seed(self, program: P, seed: int) -> int:
-        """Return the seed of a program's noise: its own, and the same whenever a run with this seed meets it."""
-        return seed_of(self.meaning(program), seed)
+    def seed(self, program: P, digest: bytes, seed: int) -> int:  # noqa: ARG002
+        """Return the seed of a program's noise: its own, and the same whenever a run with this seed meets it.
+
+        Parameters
+        ----------
+        program
+            The program.
+        digest
+            A hash of its `meaning`.
+        seed
+            The run's.
+        """
+        return seed_of(digest, seed)
+
+    def solved(self, score: np.void) -> bool:  # noqa: ARG002
+        """Whether a program is so good that the evolution ends."""
+        return False
 
     def failed(self, n: int) -> Scores:
         """Return the scores of n genomes that map to no program."""
         scores = np.zeros(n, self.score_type)
-        scores["merit"], scores["share"], scores["outcome"] = UNSOLVED, -1.0, INVALID
+        scores["merit"], scores["share"], scores["outcome"] = self.failure, -1.0, INVALID
         return scores
 
     def from_merits(self, merits: npt.NDArray[Any]) -> Scores:
-        """Make scores of plain numbers, lower is better, `UNSOLVED` for failure."""
+        """Make scores of plain numbers, lower is better, `failure` for failure."""
         scores = np.zeros(merits.shape, self.score_type)
         scores["merit"] = merits
-        scores["share"] = merits < UNSOLVED
+        scores["share"] = merits < self.failure
         return scores
 
     def check(self, results: Any, n: int) -> Scores:
@@ -95,12 +119,14 @@ class Problem(ABC, Generic[P]):
                 "tell", f"scores of shape {given.shape}", f"one score for each of the {n} programs asked for"
             )
         if np.isnan(given["merit"]).any():
-            raise expected("tell", "a score that is not a number", "numbers, 10000 for a program that fails")
+            raise expected(
+                "tell", "a score that is not a number", f"numbers, {self.failure:g} for a program that fails"
+            )
         return given
 
-    def cases(self, scores: Scores) -> Floats:  # noqa: ARG002
+    def cases(self, scores: Scores) -> Floats:
         """Return what lexicase selection compares, lower is better (population, cases)."""
-        raise expected("cases", "a problem without them", "tournament selection")
+        return np.zeros((len(scores), 0))
 
     def wants_more(self, score: np.void) -> bool:  # noqa: ARG002
         """Whether a program met again is to be scored again."""
@@ -108,15 +134,3 @@ class Problem(ABC, Generic[P]):
 
     def add(self, known: np.void, told: np.void) -> None:
         """Add to what is known of a program what its next scoring told; ``known`` is changed in place."""
-
-
-class TextProblem(Problem[str]):
-    """The words of any grammar, scored by plain numbers."""
-
-    def read(self, mapped: Mapped, i: int) -> str | None:
-        """Return genome i's text; None where its derivation does not finish."""
-        return mapped.text(i) if mapped.valid[i] else None
-
-    def meaning(self, program: str) -> bytes:
-        """Return the text as bytes."""
-        return program.encode()

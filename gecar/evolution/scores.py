@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 UNSOLVED = 1e4
-"""Merit of a program that fails (eq. 1 of the paper); what succeeds is below."""
+"""Merit of a robot program that fails (eq. 1 of the paper); what succeeds is below."""
 INVALID = -1
 """Outcome of a genome that maps to no program."""
 FIELDS = (("merit", "<f8"), ("share", "<f8"), ("outcome", "<i1"), ("steps", "<i8"))
@@ -18,7 +18,7 @@ Scores = npt.NDArray[np.void]
 Floats = npt.NDArray[np.float64]
 
 
-def merits(scores: Scores, partial_credit: bool) -> Floats:
+def merits(scores: Scores, partial_credit: bool, failure: float = UNSOLVED) -> Floats:
     """Return what tournaments and elites go by; lower is better.
 
     Parameters
@@ -26,8 +26,10 @@ def merits(scores: Scores, partial_credit: bool) -> Floats:
     scores
         The population's (population,).
     partial_credit
-        Whether the cliff at `UNSOLVED` slopes: failures then lie between 10^4 and 10^4 + 2, those with a greater
-        share below the others.
+        Whether the cliff at failure slopes: failures then lie between it and 2 above, those with a greater share below
+        the others.
+    failure
+        Merit of a program that fails.
     """
     plain: Floats = scores["merit"]
-    return np.where(plain < UNSOLVED, plain, UNSOLVED + 1.0 - scores["share"]) if partial_credit else plain
+    return np.where(plain < failure, plain, failure + 1.0 - scores["share"]) if partial_credit else plain

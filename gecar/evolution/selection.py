@@ -2,14 +2,75 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
 import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
+from gecar.evolution.crossover import Genomes
+from gecar.evolution.scores import Scores
 from gecar.random_streams import Streams, below
 
 Floats = npt.NDArray[np.float64]
 Int32s = npt.NDArray[np.int32]
+
+
+class Population(NamedTuple):
+    """What parents are selected from.
+
+    Attributes
+    ----------
+    genomes
+        Codons (population, codons).
+    scores
+        The problem's (population,); see `gecar.evolution.scores.FIELDS`.
+    merits
+        What tournaments go by, lower is better (population,).
+    cases
+        The several scores of each, lower is better (population, cases); no columns where there is one score.
+    """
+
+    genomes: Genomes
+    scores: Scores
+    merits: Floats
+    cases: Floats
+
+
+class Selection(Protocol):
+    """Selects parents."""
+
+    def __call__(self, population: Population, streams: Streams) -> Int32s:
+        """Return the places of the parents, one from each stream (streams,); neighbours become pairs."""
+
+
+@dataclass(frozen=True)
+class Tournament:
+    """Draws individuals with replacement and keeps the best.
+
+    Attributes
+    ----------
+    size
+        Individuals in a tournament.
+    """
+
+    size: int
+
+    def __call__(self, population: Population, streams: Streams) -> Int32s:
+        """Return the parents (streams,)."""
+        return tournament(population.merits, self.size, streams)
+
+
+@dataclass(frozen=True)
+class Lexicase:
+    """Goes through the cases in random order, within their median absolute deviation (Spector 2012, La Cava 2016)."""
+
+    needs_cases = True
+
+    def __call__(self, population: Population, streams: Streams) -> Int32s:
+        """Return the parents (streams,)."""
+        return lexicase(population.cases, deviations(population.cases), streams)
 
 
 @compiled

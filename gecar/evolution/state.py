@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.problem import P
-from gecar.evolution.scores import Scores
+from gecar.evolution.scores import Floats, Scores
 
 Bytes = npt.NDArray[np.uint8]
+Genomes = npt.NDArray[np.integer[Any]]
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Best(Generic[P]):
         None if no genome so far maps to a program.
     """
 
-    genome: Bytes
+    genome: Genomes
     score: Scores
     generation: int
     program: P | None
@@ -50,6 +51,12 @@ class Best(Generic[P]):
     def merit(self) -> float:
         """What selection goes by; lower is better."""
         return float(self.score["merit"][0])
+
+    @property
+    def fitness(self) -> float | Floats:
+        """What the fitness function said, (scores,) where it says several; of several draws the mean."""
+        values = self.score["values"][0] if "values" in (self.score.dtype.names or ()) else [self.merit]
+        return float(values[0]) if len(values) == 1 else np.asarray(values, float)
 
 
 @dataclass(frozen=True)
@@ -75,12 +82,12 @@ class State:
     """
 
     seed: int
-    genomes: Bytes
+    genomes: Genomes
     scores: Scores
-    best_genome: Bytes
+    best_genome: Genomes
     best_score: Scores
     best_generation: int
-    contenders: Bytes
+    contenders: Genomes
     contender_scores: Scores
     contender_generations: npt.NDArray[np.int64]
     history: npt.NDArray[np.void]

@@ -5,7 +5,7 @@ Only nonterminals are ever put on a stack; text is written later, from the choic
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from gecar.language.grammar import Grammar
 
 Int32s = npt.NDArray[np.int32]
 Int64s = npt.NDArray[np.int64]
-Bytes = npt.NDArray[np.uint8]
+Codons = npt.NDArray[np.integer[Any]]
 Bools = npt.NDArray[np.bool_]
 
 
@@ -25,7 +25,7 @@ class Tables(NamedTuple):
     Attributes
     ----------
     chosen
-        The production each codon chooses (nonterminals, 256); a table, since a division takes longer.
+        The production each codon below 256 chooses (nonterminals, 256); a table, since a division takes longer.
     reads
         Whether choosing takes a codon (nonterminals,).
     first_production
@@ -57,7 +57,7 @@ def tables(grammar: Grammar, single_choice_consumes: bool) -> Tables:
 
 @compiled
 def derive_one(
-    genome: Bytes, limit: int, table: Tables, stack: Int32s, choices: Bytes
+    genome: Codons, limit: int, table: Tables, stack: Int32s, choices: Codons
 ) -> tuple[bool, int, int]:
     """Derive leftmost from the start until no nonterminal is left, or codons or room run out.
 
@@ -89,8 +89,13 @@ def derive_one(
         if table.reads[symbol]:
             if read == limit:
                 return False, read, replaced
-            choices[read] = table.chosen[symbol, genome[at]] - production
-            production = table.chosen[symbol, genome[at]]
+            codon = genome[at]
+            if codon < 256:  # of bytes always, so this is not compiled for them
+                choices[read] = table.chosen[symbol, codon] - production
+                production = table.chosen[symbol, codon]
+            else:
+                choices[read] = codon % (table.first_production[symbol + 1] - production)
+                production += choices[read]
             read += 1
             at += 1
             if at == genome.size:
@@ -108,8 +113,8 @@ def derive_one(
 
 @compiled
 def derive_all(
-    genomes: Bytes, readings: int, max_symbols: int, table: Tables
-) -> tuple[Bools, Int32s, Int64s, Int64s, Bytes]:
+    genomes: Codons, readings: int, max_symbols: int, variable: bool, table: Tables
+) -> tuple[Bools, Int32s, Int64s, Int64s, Codons]:
     """Derive from every genome.
 
     Parameters
@@ -120,6 +125,8 @@ def derive_all(
         How often each genome may be read, 1 without wrapping.
     max_symbols
         Bound on the nonterminals of one derivation, replaced and waiting.
+    variable
+        Whether a genome ends before its first negative codon.
     table
         The grammar.
 
@@ -134,15 +141,21 @@ def derive_all(
     used = np.zeros(n, np.int32)
     offsets, node_offsets = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
     stack = np.empty(max_symbols, np.int32)
-    choices = np.empty(limit + 16 * n, np.uint8)
+    choices = np.empty(limit + 16 * n, genomes.dtype)
     for i in range(n):
         begin = offsets[i]
         if begin + limit > choices.size:
-            longer = np.empty(2 * choices.size + limit, np.uint8)
+            longer = np.empty(2 * choices.size + limit, genomes.dtype)
             for k in range(begin):  # a slice assignment takes a second to compile
                 longer[k] = choices[k]
             choices = longer
-        valid[i], used[i], replaced = derive_one(genomes[i], limit, table, stack, choices[begin:])
+        length = codons
+        if variable:
+            length = 0
+            while length < codons and genomes[i, length] >= 0:
+                length += 1
+        most = min(length * readings, limit)
+        valid[i], used[i], replaced = derive_one(genomes[i, :length], most, table, stack, choices[begin:])
         offsets[i + 1] = begin + valid[i] * used[i]
         node_offsets[i + 1] = node_offsets[i] + valid[i] * replaced
     return valid, used, offsets, node_offsets, choices[: offsets[n]]
@@ -150,7 +163,7 @@ def derive_all(
 
 @compiled
 def lay_nodes(
-    node_offsets: Int64s, offsets: Int64s, choices: Bytes, table: Tables, stack: Int32s
+    node_offsets: Int64s, offsets: Int64s, choices: Codons, table: Tables, stack: Int32s
 ) -> tuple[Int32s, Int32s, Int32s, Int32s]:
     """Write the nodes of every derivation tree, a node before its children, left before right.
 

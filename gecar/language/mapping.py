@@ -12,10 +12,12 @@ import numpy as np
 
 from gecar.errors import InputError, expected
 from gecar.language import derivation
-from gecar.language.derivation import Bools, Bytes, Int32s, Int64s
+from gecar.language.derivation import Bools, Codons, Int32s, Int64s
 from gecar.language.grammar import Grammar
 from gecar.language.program import Program, parse_program
 from gecar.language.steps import Step, derive
+
+MAX_CODON_SIZE = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -32,17 +34,30 @@ class MappingOptions:
         The most nonterminals one derivation may hold, replaced and waiting together. A derivation takes no
         more steps than this, and a call no more memory than four bytes for each, whatever the grammar; what
         goes beyond is invalid.
+    codon_size
+        Codons are whole numbers from 0 up to but without this. A rule with more productions needs larger ones.
+    variable_length
+        Whether genomes differ in length: a genome's row then ends with -1 in every place it does not fill.
     """
 
     wraps: int = 0
     single_choice_consumes: bool = False
     max_symbols: int = 100_000
+    codon_size: int = 256
+    variable_length: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.wraps <= 1_000_000:
             raise expected("wraps", self.wraps, "a whole number from 0 to 1000000")
         if not 1 <= self.max_symbols <= 10_000_000:
             raise expected("max_symbols", self.max_symbols, "a whole number from 1 to 10000000")
+        if not 2 <= self.codon_size <= MAX_CODON_SIZE:
+            raise expected("codon_size", self.codon_size, f"a whole number from 2 to {MAX_CODON_SIZE}")
+
+    @property
+    def codon_type(self) -> np.dtype[Any]:
+        """Dtype of codons: bytes where they suffice, int32 otherwise."""
+        return np.dtype(np.uint8 if self.codon_size <= 256 and not self.variable_length else np.int32)
 
 
 @dataclass(frozen=True)
@@ -100,7 +115,15 @@ class Mapper:
         What codons choose from.
     options
         How they are read.
+
+    Attributes
+    ----------
+    linear
+        Whether derivations read codons from the first on, each one the next choice of a leftmost derivation, as
+        operators on used codons and subtrees need.
     """
+
+    linear = True
 
     def __init__(self, grammar: Grammar, options: MappingOptions | None = None) -> None:
         self.grammar = grammar
@@ -113,7 +136,7 @@ class Mapper:
         Parameters
         ----------
         genomes
-            Codons 0..255 (genomes, codons).
+            Codons (genomes, codons), 0..255 unless the options say otherwise.
 
         Raises
         ------
@@ -121,7 +144,11 @@ class Mapper:
             If it is not such an array. A derivation that does not finish is no error, but invalid.
         """
         valid, used, offsets, node_offsets, choices = derivation.derive_all(
-            _as_genomes(genomes), self.options.wraps + 1, self.options.max_symbols, self.tables
+            self.as_genomes(genomes),
+            self.options.wraps + 1,
+            self.options.max_symbols,
+            self.options.variable_length,
+            self.tables,
         )
         return Mapped(self, valid, used, offsets, choices.copy(), node_offsets)
 
@@ -131,11 +158,21 @@ class Mapper:
         Raises
         ------
         InputError
-            If it is not one genome of codons 0..255.
+            If it is not one genome.
         """
-        codons = _as_genomes([genome])[0].tolist()
+        codons = [codon for codon in self.as_genomes([genome])[0].tolist() if codon >= 0]
         readings = chain.from_iterable(repeat(codons, self.options.wraps + 1))
         return derive(self.grammar, self.tables.reads.tolist(), readings, self.options.max_symbols)
+
+    def as_genomes(self, genomes: Any) -> Codons:
+        """Return codons as the kind of array the kernels are compiled for.
+
+        Raises
+        ------
+        InputError
+            If they are no codons of this mapper.
+        """
+        return _as_genomes(genomes, self.options)
 
 
 @dataclass(frozen=True)
@@ -164,7 +201,7 @@ class Mapped:
     valid: Bools
     used: Int32s
     offsets: Int64s
-    choices: Bytes
+    choices: Codons
     node_offsets: Int64s
 
     def __len__(self) -> int:
@@ -185,7 +222,7 @@ class Mapped:
         if not self.valid[i]:
             raise expected(f"genome {i}", "a derivation that does not finish", "a valid genome")
         reads, rules = self.mapper.tables.reads, self.mapper.grammar.rules
-        chosen = iter(self.key(i))
+        chosen = iter(self.choices[self.offsets[i] : self.offsets[i + 1]].tolist())
         written: list[str] = []
         waiting: list[str | int] = [0]
         while waiting:
@@ -253,16 +290,48 @@ class Mapped:
         return tuple(reversed(tree))
 
 
-def _as_genomes(genomes: Any) -> Bytes:
-    """Return codons as the one kind of array the kernels are compiled for."""
+@dataclass(frozen=True)
+class Derivation:
+    """What one genome derives: its text, or its tree for those who want to know how the text came about.
+
+    Attributes
+    ----------
+    mapped, index
+        The population, and which of its genomes; it is valid.
+    """
+
+    mapped: Mapped
+    index: int
+
+    @cached_property
+    def text(self) -> str:
+        """What stands there when no nonterminal is left."""
+        return self.mapped.text(self.index)
+
+    @property
+    def tree(self) -> tuple[TreeNode, ...]:
+        """The derivation tree, each node before its children."""
+        return self.mapped.tree(self.index)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def _as_genomes(genomes: Any, options: MappingOptions) -> Codons:
+    lowest, highest = -1 if options.variable_length else 0, options.codon_size - 1
+    wanted = f"codons {lowest}..{highest}"
     try:
         array = np.asarray(genomes)
     except ValueError:
-        raise expected("genomes", "rows of different length", "codons 0..255 (genomes, codons)") from None
+        raise expected("genomes", "rows of different length", f"{wanted} (genomes, codons)") from None
     if array.ndim != 2:
-        raise expected("genomes", f"an array of shape {array.shape}", "codons 0..255 (genomes, codons)")
-    if array.dtype != np.uint8:
+        raise expected("genomes", f"an array of shape {array.shape}", f"{wanted} (genomes, codons)")
+    if array.dtype != np.uint8 or options.codon_size != 256:
         whole = array.size == 0 or np.issubdtype(array.dtype, np.integer)
-        if not whole or (array.size and not 0 <= array.min() <= array.max() <= 255):
-            raise expected("genomes", f"{array.dtype} codons, not all 0..255", "whole numbers 0..255")
-    return np.require(array, np.uint8, ["C", "W"])
+        if not whole or (array.size and not lowest <= array.min() <= array.max() <= highest):
+            raise expected(
+                "genomes",
+                f"{array.dtype} codons, not all {lowest}..{highest}",
+                f"whole numbers {lowest}..{highest}",
+            )
+    return np.require(array, options.codon_type, ["C", "W"])

@@ -77,8 +77,8 @@ class Task:
         """Return an evolution, new or from a state on."""
         search = self.config.search
         if state is None:
-            return Evolution(search, self.mapper, self.problem, self.config.seed)
-        return Evolution.resume(search, self.mapper, self.problem, state)
+            return Evolution(self.mapper, self.problem, search, self.config.seed)
+        return Evolution.resume(state, self.mapper, self.problem, search)
 
 
 def load_task(config: Config) -> Task:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.problem import Problem, seed_of
-from gecar.evolution.scores import Floats, Scores
-from gecar.language.mapping import Mapped
+from gecar.evolution.scores import UNSOLVED, Floats, Scores
+from gecar.language.mapping import Derivation
 from gecar.language.opcodes import LINE, MAX_DUTY_PCT, NOT_EQUAL, A, B
 from gecar.language.program import Program
 from gecar.search.chance import add_drives, n_times, wants_more
@@ -52,6 +52,11 @@ class RobotPrograms(Problem[Program]):
         return score_type(self.n_arrivals, self.n_times)
 
     @property
+    def failure(self) -> float:
+        """10^4, as in eq. 1."""
+        return UNSOLVED
+
+    @property
     def rescored(self) -> bool:
         """Whether programs are driven under drawn conditions, and again under others when met again."""
         return self.n_times > 0
@@ -61,18 +66,18 @@ class RobotPrograms(Problem[Program]):
         """Checkpoints and GOAL."""
         return self.n_arrivals
 
-    def read(self, mapped: Mapped, i: int) -> Program | None:
-        """Return genome i's program; None where it maps to none."""
-        return mapped.program(i)
+    def read(self, derivation: Derivation) -> Program | None:
+        """Return the program; None where the text is none."""
+        return derivation.mapped.program(derivation.index)
 
-    def meaning(self, program: Program) -> bytes:
+    def meaning(self, program: Program, derivation: Derivation | None = None) -> bytes:  # noqa: ARG002
         """Return opcodes without line numbers, duties cut at the cap."""
         rows = program.opcodes[:, :LINE].copy()
         cap = max(self.duty_cap_pct, NOT_EQUAL)  # what a TEST holds in these columns stays as it is
         np.minimum(np.maximum(rows[:, A : B + 1], -cap), cap, out=rows[:, A : B + 1])
         return rows.tobytes()
 
-    def seed(self, program: Program, seed: int) -> int:
+    def seed(self, program: Program, digest: bytes, seed: int) -> int:  # noqa: ARG002
         """Return the seed of the noise a program is driven with; see `noise_seed`."""
         return noise_seed(seed, program)
 
@@ -86,7 +91,7 @@ class RobotPrograms(Problem[Program]):
 
     def cases(self, scores: Scores) -> Floats:
         """Return the times from checkpoint to checkpoint [s]."""
-        return segment_times(scores["arrival_s"])
+        return segment_times(scores["arrival_s"]) if self.n_arrivals else super().cases(scores)
 
     def wants_more(self, score: np.void) -> bool:
         """Whether a program met again is to be driven under fresh conditions: it arrived often enough so far."""

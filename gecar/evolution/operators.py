@@ -1,0 +1,138 @@
+"""Operators as objects: whatever has the protocol takes the place of any of them.
+
+evolution = Evolution(mapper, fitness=error, operators=Operators.of(settings, select=Tournament(2), mutation=mine))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from gecar.errors import expected
+from gecar.evolution.crossover import Genomes, OnePoint, Subtree, VariableOnePoint
+from gecar.evolution.initialisation import Initialisation, Ptc2, Sensible, Uniform
+from gecar.evolution.lineage import MUTATION
+from gecar.evolution.mutation import Creep, Duplicate, Flip, Renew
+from gecar.evolution.selection import Lexicase, Selection, Tournament
+from gecar.evolution.settings import EvolutionSettings
+from gecar.language.mapping import Mapper
+from gecar.random_streams import Streams
+
+GROWN = 0.7
+"""Probability that a child of a stagnant population has one of its subtrees duplicated."""
+LONGEST = 54
+"""Most codons of such a child: six conditions of Table 3, 24 lines. Without a limit winners had up to 18 conditions."""
+
+
+class Variation(Protocol):
+    """Changes children: crossover, mutation, or anything else.
+
+    These attributes, which need not be there, say more of it.
+
+    ``change``: `gecar.evolution.lineage.CROSSOVER`, `MUTATION` (the default), `CREEP` or `DUPLICATION`.
+    ``linear``: whether it needs a mapper that reads codons from the first on (default: no).
+    ``fresh``: whether children owe nothing to their parents (default: no).
+    """
+
+    def __call__(self, genomes: Any, mapper: Any, streams: Streams) -> Genomes:
+        """Return the children.
+
+        Parameters
+        ----------
+        genomes
+            Codons, may be changed in place (children, codons); 0 and 1 are a pair, 2 and 3, and so on.
+        mapper
+            What they derive.
+        streams
+            One for each (children,); `gecar.random_streams.generators` makes NumPy generators of them.
+        """
+
+
+@dataclass(frozen=True)
+class Operators:
+    """What an evolution breeds with.
+
+    Attributes
+    ----------
+    initialise
+        Makes first populations.
+    select
+        Selects parents.
+    vary
+        Change children, one after the other: crossover, mutation and so on.
+    grow
+        Take their place in a population that grows; see `restart` of `EvolutionSettings`.
+    """
+
+    initialise: Initialisation
+    select: Selection
+    vary: tuple[Variation, ...]
+    grow: tuple[Variation, ...] = (Duplicate(GROWN, LONGEST),)
+
+    @classmethod
+    def of(
+        cls,
+        settings: EvolutionSettings,
+        *,
+        initialise: Initialisation | None = None,
+        select: Selection | None = None,
+        crossover: Variation | None = None,
+        mutation: Variation | None = None,
+    ) -> Operators:
+        """Return the operators that settings name, some of them replaced by those given."""
+        initialise = initialise or INITIALISATIONS[settings.initialisation](settings)
+        select = select or SELECTIONS[settings.selection](settings)
+        creep = (Creep(settings.creep_rate, settings.creep_most),) if settings.creep_rate else ()
+        grow = (Duplicate(GROWN, LONGEST), *creep)
+        if settings.mutation == "renew" and mutation is None:
+            return cls(initialise, select, (Renew(initialise),), grow)
+        crossover = crossover or CROSSOVERS[settings.crossover](settings.crossover_rate)
+        rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
+        mutation = mutation or Flip(rate, within_used=settings.mutation != "codon")
+        return cls(initialise, select, (crossover, mutation, *creep), grow)
+
+    def check(self, mapper: Mapper, n_cases: int) -> None:
+        """Check that the operators suit a mapper and scores.
+
+        Raises
+        ------
+        InputError
+            If one needs cases and there are none, or codons read from the first on and the mapper has genes.
+        """
+        if getattr(self.select, "needs_cases", False) and n_cases == 0:
+            raise expected("selection", "lexicase without cases", "scores with cases, or tournament")
+        for operator in self.vary:
+            if getattr(operator, "linear", False) and not mapper.linear:
+                found = f"{type(operator).__name__} for a {type(mapper).__name__}"
+                raise expected("operators", found, "operators on genes, such as GeneCrossover and GeneFlip")
+
+
+def change_of(operator: Variation) -> np.uint8:
+    """Return the bit that says in a lineage what changed a program."""
+    return np.uint8(getattr(operator, "change", MUTATION))
+
+
+def any_fresh(operators: Sequence[Variation]) -> bool:
+    """Whether children owe nothing to their parents."""
+    return any(getattr(operator, "fresh", False) for operator in operators)
+
+
+INITIALISATIONS: dict[str, Callable[[EvolutionSettings], Initialisation]] = {
+    "uniform": lambda settings: Uniform(settings.codons),
+    "sensible": lambda settings: Sensible(settings.codons, settings.initial_depth),
+    "ptc2": lambda settings: Ptc2(settings.codons, settings.initial_expansions),
+}
+SELECTIONS: dict[str, Callable[[EvolutionSettings], Selection]] = {
+    "tournament": lambda settings: Tournament(settings.tournament),
+    "lexicase": lambda settings: Lexicase(),  # noqa: ARG005
+}
+CROSSOVERS: dict[str, Callable[[float], Variation]] = {
+    "one_point": OnePoint,
+    "one_point_used": lambda rate: OnePoint(rate, within_used=True),
+    "variable_one_point": VariableOnePoint,
+    "subtree": Subtree,
+}
+"""Operators by the names settings know."""
