@@ -9,8 +9,10 @@ Fitness(walk, draws=8)                                chance has a part: walk(pr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Generic
 
 import numpy as np
@@ -64,7 +66,7 @@ class Fitness(Generic[P]):
                 "fitness", f"maximise for {len(self.maximise)} scores", f"one for each of {self.scores}"
             )
 
-    @property
+    @cached_property
     def signs(self) -> Floats:
         """1 for each score of which lower is better, else -1 (scores,)."""
         return np.where(np.broadcast_to(self.maximise, self.scores), -1.0, 1.0)
@@ -80,8 +82,8 @@ class Fitness(Generic[P]):
 
     def merit(self, values: Floats) -> float:
         """Return what ranks, lower is better; inf where a score is not finite."""
-        if not np.isfinite(values).all():
-            return np.inf
+        if not all(map(math.isfinite, values.tolist())):
+            return math.inf
         turned = self.signs * values
         return float(turned[0] if self.overall is None else self.overall(turned))
 
@@ -153,6 +155,8 @@ class FitnessProblem(Problem[P]):
             values = np.asarray(results, float)
         except (TypeError, ValueError):
             raise expected("fitness", f"scores such as {_first(results)}", f"numbers, {wanted}") from None
+        if n == 0 == values.size:
+            return self.from_values(values.reshape(0, self.fitness.scores))
         if values.shape not in {(n, self.fitness.scores), *([] if self.n_cases else [(n,)])}:
             found = f"scores of shape {values.shape} for {n} programs"
             raise expected("fitness", found, f"numbers, {wanted}")

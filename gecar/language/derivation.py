@@ -34,6 +34,11 @@ class Tables(NamedTuple):
         Where each production's nonterminals begin in `children` (productions + 1,).
     children
         The nonterminals of all productions, the last of each production first, as a stack wants them.
+    first_part
+        Where each production's parts begin in `parts` (productions + 1,).
+    parts
+        The parts of all productions, the last of each production first: -1 - k is nonterminal k, others are numbers of
+        words.
     """
 
     chosen: Int32s
@@ -41,18 +46,33 @@ class Tables(NamedTuple):
     first_production: Int32s
     first_child: Int32s
     children: Int32s
+    first_part: Int32s
+    parts: Int32s
 
 
 def tables(grammar: Grammar, single_choice_consumes: bool) -> Tables:
     """Lay a grammar out in arrays."""
     children = [production.nonterminals[::-1] for production in grammar.productions]
+    number = {word: k for k, word in enumerate(words(grammar))}
+    parts = [
+        [number[part] if isinstance(part, str) else -1 - part for part in production.parts[::-1]]
+        for production in grammar.productions
+    ]
     return Tables(
         grammar.first_production[:-1, None] + np.arange(256, dtype=np.int32) % grammar.n_choices[:, None],
         (grammar.n_choices > 1) | single_choice_consumes,
         grammar.first_production,
         np.cumsum([0, *map(len, children)]).astype(np.int32),
         np.array([child for group in children for child in group], np.int32),
+        np.cumsum([0, *map(len, parts)]).astype(np.int32),
+        np.array([part for group in parts for part in group], np.int32),
     )
+
+
+def words(grammar: Grammar) -> tuple[str, ...]:
+    """Return the texts a grammar's words are put together from, each once."""
+    parts = (part for production in grammar.productions for part in production.parts)
+    return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
 
 
 @compiled
@@ -201,3 +221,50 @@ def lay_nodes(
             stack[waiting] = end[node]
             waiting += 1
     return symbol, production, begin, end
+
+
+@compiled
+def write_words(offsets: Int64s, choices: Codons, valid: Bools, table: Tables) -> tuple[Int64s, Int32s]:
+    """Write the words every derivation consists of, by their numbers.
+
+    Returns
+    -------
+    offsets, numbers
+        Where each genome's begin (genomes + 1,); the words of all (words,).
+    """
+    begins = np.zeros(valid.size + 1, np.int64)
+    written, stack = np.empty(1_024, np.int32), np.empty(1_024, np.int32)
+    n = 0
+    for i in range(valid.size):
+        read = offsets[i]
+        waiting = 1 if valid[i] else 0
+        stack[0] = -1
+        while waiting > 0:
+            waiting -= 1
+            part = stack[waiting]
+            if part >= 0:
+                if n == written.size:
+                    written = _longer(written)
+                written[n] = part
+                n += 1
+                continue
+            production = table.first_production[-1 - part]
+            if table.reads[-1 - part]:
+                production += choices[read]
+                read += 1
+            first, end = table.first_part[production], table.first_part[production + 1]
+            while waiting + end - first > stack.size:
+                stack = _longer(stack)
+            for k in range(first, end):
+                stack[waiting] = table.parts[k]
+                waiting += 1
+        begins[i + 1] = n
+    return begins, written[:n].copy()
+
+
+@compiled
+def _longer(numbers: Int32s) -> Int32s:
+    longer = np.empty(2 * numbers.size, np.int32)
+    for k in range(numbers.size):
+        longer[k] = numbers[k]
+    return longer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, repeat
+from itertools import chain, repeat, takewhile
 from typing import Any
 
 import numpy as np
@@ -121,6 +121,8 @@ class Mapper:
     linear
         Whether derivations read codons from the first on, each one the next choice of a leftmost derivation, as
         operators on used codons and subtrees need.
+    words
+        The texts that words of the grammar are put together from.
     """
 
     linear = True
@@ -129,6 +131,7 @@ class Mapper:
         self.grammar = grammar
         self.options = options or MappingOptions()
         self.tables = derivation.tables(grammar, self.options.single_choice_consumes)
+        self.words = derivation.words(grammar)
 
     def map(self, genomes: Any) -> Mapped:
         """Derive from every genome.
@@ -160,7 +163,7 @@ class Mapper:
         InputError
             If it is not one genome.
         """
-        codons = [codon for codon in self.as_genomes([genome])[0].tolist() if codon >= 0]
+        codons = list(takewhile(lambda codon: codon >= 0, self.as_genomes([genome])[0].tolist()))
         readings = chain.from_iterable(repeat(codons, self.options.wraps + 1))
         return derive(self.grammar, self.tables.reads.tolist(), readings, self.options.max_symbols)
 
@@ -221,17 +224,14 @@ class Mapped:
         """
         if not self.valid[i]:
             raise expected(f"genome {i}", "a derivation that does not finish", "a valid genome")
-        reads, rules = self.mapper.tables.reads, self.mapper.grammar.rules
-        chosen = iter(self.choices[self.offsets[i] : self.offsets[i + 1]].tolist())
-        written: list[str] = []
-        waiting: list[str | int] = [0]
-        while waiting:
-            part = waiting.pop()
-            if isinstance(part, str):
-                written.append(part)
-            else:
-                waiting.extend(reversed(rules[part].productions[next(chosen) if reads[part] else 0].parts))
-        return "".join(written)
+        begins, numbers = self._written
+        words = self.mapper.words
+        return "".join([words[k] for k in numbers[begins[i] : begins[i + 1]].tolist()])
+
+    @cached_property
+    def _written(self) -> tuple[Int64s, Int32s]:
+        """The numbers of all derivations' words, and where each genome's begin."""
+        return derivation.write_words(self.offsets, self.choices, self.valid, self.mapper.tables)
 
     def program(self, i: int) -> Program | None:
         """Read genome i's phenotype as a robot program.

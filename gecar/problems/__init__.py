@@ -1,0 +1,1 @@
+"""Problems of the field beside the robot: phenotypes and fitnesses to study Grammatical Evolution with."""
