@@ -22,8 +22,8 @@ from gecar.files import write_whole
 from gecar.report.table import piped, seconds
 from gecar.results.arrival import percent
 from gecar.results.cells import Cell
-from gecar.results.quantile import quantile
-from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
+from gecar.results.quantile import median_interval, quantile
+from gecar.results.statistics import contrast, evaluations_to, holm
 from gecar.search.settings import PRESETS
 from gecar.world.course.course import list_courses
 

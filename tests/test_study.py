@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,10 +8,19 @@ from gecar.errors import InputError
 from gecar.parallel.run_parallel import Workplace
 from gecar.plots.runs.compare_runs import compare_runs
 from gecar.report.runs import summaries
-from gecar.report.table import PAPER_TABLE_5, csv_text, markdown, paper_figures
+from gecar.report.table import (
+    PAPER_TABLE_5,
+    contrasted,
+    contrasts_csv,
+    csv_text,
+    latex,
+    markdown,
+    paper_figures,
+)
 from gecar.results.cells import cells_of, difference_p
 from gecar.results.fitness_table import Move
-from gecar.results.statistics import contrast, evaluations_to, holm, median_interval
+from gecar.results.quantile import median_interval
+from gecar.results.statistics import contrast, evaluations_to, holm
 from gecar.results.study import Axis, Study, StudyFolder, read_study
 from gecar.results.study_runs import perform, perform_all
 
@@ -125,13 +135,13 @@ def test_cells_count_a_run_without_goal_as_slowest():
     assert (figures["runs"], figures["solved"], figures["median_s"], figures["best_s"]) == (3, 2, 20.0, 16.0)
     assert figures["mean_s"] == np.inf
     assert figures["mean_solved_s"] == 18.0
-    assert difference_p(cells) is None  # all cells agree
+    assert difference_p(study(), cells) is None  # all cells agree
 
 
 def test_a_setting_that_always_helps_is_told_from_chance():
     runs = study(seeds=tuple(range(8))).plan()
     better = [record(run, 20.0 + run.config.seed - 3.0 * run.row) for run in runs]
-    assert difference_p(cells_of(runs, better)) < 0.001
+    assert difference_p(study(), cells_of(runs, better)) < 0.001
 
 
 def test_cells_are_contrasted_as_the_field_does():
@@ -139,9 +149,48 @@ def test_cells_are_contrasted_as_the_field_does():
     cells = cells_of(runs, [record(run, 1e4 if run.row else 20.0 + run.config.seed) for run in runs])
     slower, equal = contrast(cells[2], cells[0]), contrast(cells[1], cells[0])
     assert slower.a12 == 0.0  # never at GOAL is slower than any
-    assert slower.p < 0.001
-    assert equal == (1.0, 0.5)
-    assert "| 1 | 0.1 | 0.00 |" in markdown(study(), cells, {}, "about")
+    assert slower.p == pytest.approx(2 / 2**8)  # each of eight seeds is slower
+    assert equal == (1.0, 0.5, True)
+    assert "| 1 | 0.1 | 0, 0.1 | 0.00 | 0.023 |" in markdown(study(), cells, {}, "about")
+    fewer = replace(cells[2], records=cells[2].records[:7])
+    assert not contrast(fewer, cells[0]).paired
+    assert contrast(fewer, cells[0]).p < 0.001
+
+
+def test_seeds_in_pairs_show_what_lies_within_the_spread_of_seeds():
+    runs = study(seeds=tuple(range(8))).plan()
+    cells = cells_of(runs, [record(run, 20.0 + 5.0 * run.config.seed - 0.5 * run.row) for run in runs])
+    test = contrast(cells[2], cells[0])
+    assert test.p < 0.01
+    assert 0.5 < test.a12 < 0.6
+
+
+def test_what_is_compared_had_the_same_course():
+    mixed = Study({}, SMALL, Axis("course", ("paper", "hairpin")), Axis("elites", (0, 1, 2)), tuple(range(6)))
+    runs = mixed.plan()
+    slow = [
+        record(run, (20.0 if run.row == "paper" else 40.0) + run.config.seed - run.column) for run in runs
+    ]
+    cells = cells_of(runs, slow)
+    compared = contrasted(mixed, cells)
+    assert [(each.cell.row, each.first.row, each.first.column) for each in compared] == [
+        ("paper", "paper", 0), ("paper", "paper", 0), ("hairpin", "hairpin", 0), ("hairpin", "hairpin", 0),
+    ]  # fmt: skip
+    assert difference_p(mixed, cells) < 1e-4  # twelve blocks: two courses with six seeds
+    courses = Study({}, SMALL, Axis("course", ("paper", "hairpin")), Axis("noise", (0.0, 1.0)), (1, 2))
+    runs = courses.plan()
+    assert difference_p(courses, cells_of(runs, [record(run, 20.0) for run in runs])) is None
+    assert contrasts_csv(mixed, compared).splitlines()[1].startswith("paper,1,paper,0,")
+
+
+def test_the_table_is_latex_too():
+    runs = study(seeds=tuple(range(8))).plan()
+    cells = cells_of(runs, [record(run, 20.0 + run.config.seed) for run in runs])
+    text = latex(study(), cells, {})
+    assert text.startswith("\\begin{tabular}{llrrrrrrrrr}\n\\toprule\nelites & mutation rate & runs &")
+    assert "median [s] (95 \\%)" in text
+    assert "24.00 (20.00 to 27.00)" in text
+    assert text.count(r" \\") == 5
 
 
 def test_holms_correction_is_that_of_his_paper():
@@ -165,7 +214,8 @@ def test_a_medians_interval_holds_it_and_narrows_with_more_runs():
     few, many = np.linspace(14.0, 16.0, 9), np.linspace(14.0, 16.0, 99)
     (low, high), (lower, higher) = median_interval(few), median_interval(many)
     assert low < lower < 15.0 < higher < high
-    assert median_interval(np.array([1.0, np.inf, np.inf]))[1] == np.inf
+    assert median_interval([1.0, 2.0, 3.0, *[np.inf] * 5]) == (1.0, np.inf)
+    assert np.isnan(median_interval([1.0, 2.0, 3.0, 4.0, 5.0])).all()  # one of 94 % is all there is
 
 
 def test_evaluations_to_a_time_are_those_of_the_first_generation_that_reached_it():

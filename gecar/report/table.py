@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.markup import escape
 from rich.table import Table
 
 from gecar.results.arrival import percent, share_of
-from gecar.results.cells import Cell, difference_p
-from gecar.results.statistics import contrast, holm
+from gecar.results.cells import Cell, difference_p, problem_of
+from gecar.results.statistics import Contrast, contrast, holm
 from gecar.results.study import TABLE_5, Planned, Study
 
 PAPER_TABLE_5: Mapping[tuple[float, float], float] = {
@@ -72,43 +73,95 @@ def markdown(
         One line on what stayed.
     """
     blocks = [f"# {_letters(study)}", about, _matrix(study, cells, paper), _full(study, cells, paper)]
-    p = difference_p(cells)
+    p = difference_p(study, cells)
     if p is not None:
         blocks.append(f"Do the cells differ at all? Friedman over the seeds: p = {p:.2g}.")
-    blocks += [contrasts(study, cells)] if len(cells) > 1 and all(cell.records for cell in cells) else []
+    compared = contrasted(study, cells)
+    blocks += [contrasts(study, compared)] if compared else []
     return "\n\n".join(blocks) + "\n"
 
 
-def contrasts(study: Study, cells: Sequence[Cell]) -> str:
-    """Write each cell against the first as Markdown.
+class Compared(NamedTuple):
+    """A cell, and how it does against the first that had the same problem."""
+
+    cell: Cell
+    first: Cell
+    test: Contrast
+    corrected_p: float
+
+
+def contrasted(study: Study, cells: Sequence[Cell]) -> list[Compared]:
+    """Compare each cell with the first of the same course, robot and so on; none where a run is missing.
 
     Parameters
     ----------
     study
         What was varied.
     cells
-        At least two, each with a run.
+        What came of it.
     """
-    first, *others = cells
-    found = [contrast(cell, first) for cell in others]
-    corrected = holm([test.p for test in found])
-    lines = [[setting_words(study.rows.name), setting_words(study.columns.name), "A12", "p"]]
-    for cell, test, p in zip(others, found, corrected, strict=True):
-        lines.append([str(cell.row), str(cell.column), f"{test.a12:.2f}", f"{p:.2g}"])
+    if not all(cell.records for cell in cells):
+        return []
+    firsts: dict[tuple[str, ...], Cell] = {}
+    pairs = [(cell, firsts.setdefault(problem_of(study, cell), cell)) for cell in cells]
+    tests = [(cell, first, contrast(cell, first)) for cell, first in pairs if cell is not first]
+    corrected = holm([test.p for _, _, test in tests])
+    return [Compared(*each, float(p)) for each, p in zip(tests, corrected, strict=True)]
+
+
+def contrasts(study: Study, compared: Sequence[Compared]) -> str:
+    """Write comparisons as Markdown."""
+    lines = [[*_axes(study), "against", "A12", "p"]]
+    for cell, first, test, p in compared:
+        against = f"{first.row}, {first.column}"
+        lines.append([str(cell.row), str(cell.column), against, f"{test.a12:.2f}", f"{p:.2g}"])
+    tests = {
+        "Wilcoxon's signed ranks over the seeds" if each.test.paired else "Mann-Whitney" for each in compared
+    }
     note = (
-        f"Against the first cell ({first.row}, {first.column}): A12 is how often a run is faster than one of the "
-        "first cell's (Vargha and Delaney; 0.5 is no difference), p the Mann-Whitney test's, corrected by Holm."
+        "A12 is how often a run is faster than one of the cell it is set against (Vargha and Delaney; 0.5 is no "
+        f"difference), p that of {' or '.join(sorted(tests))}, corrected by Holm."
     )
     return f"{piped(lines)}\n\n{note}"
 
 
+def contrasts_csv(study: Study, compared: Sequence[Compared]) -> str:
+    """Write comparisons as CSV."""
+    stream = io.StringIO()
+    out = csv.writer(stream, lineterminator="\n")
+    names = study.rows.name, study.columns.name
+    out.writerow([*names, *(f"against_{name}" for name in names), "a12", "p", "p_holm", "paired"])
+    for cell, first, test, p in compared:
+        out.writerow([cell.row, cell.column, first.row, first.column, test.a12, test.p, p, test.paired])
+    return stream.getvalue()
+
+
+def latex(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
+    """Write the table of all figures for LaTeX; it needs the package booktabs."""
+    head, *rows = ([_escaped(word) for word in line] for line in _full_lines(study, cells, paper))
+    body = [" & ".join(line) + r" \\" for line in rows]
+    columns = "l" * 2 + "r" * (len(head) - 2)
+    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", " & ".join(head) + r" \\", r"\midrule", *body]
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+_MARKS = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+
+
+def _escaped(word: str) -> str:
+    return re.sub(r"[\\~^&%$#_{}]", lambda mark: _MARKS.get(mark[0], "\\" + mark[0]), word)
+
+
 def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
-    """Write a row for each cell as CSV; empty where there is no number, inf where GOAL was not reached."""
+    """Write a row for each cell as CSV; empty where there is no number, inf where GOAL was not reached.
+
+    The paper gives no number where its runs did not converge.
+    """
     stream = io.StringIO()
     out = csv.writer(stream, lineterminator="\n")
     out.writerow([study.rows.name, study.columns.name, *cells[0].figures(), *(["paper_s"] if paper else [])])
     for cell in cells:
-        figures = [*cell.figures().values(), *([of_paper(cell, paper)] if paper else [])]
+        figures = [*cell.figures().values(), *([_number(of_paper(cell, paper))] if paper else [])]
         out.writerow([cell.row, cell.column, *map(_csv, figures)])
     return stream.getvalue()
 
@@ -133,7 +186,7 @@ def as_table(
         "rows": {study.rows.name: list(study.rows.values)},
         "columns": {study.columns.name: list(study.columns.values)},
         "seeds": list(study.seeds),
-        "difference_p": difference_p(cells),
+        "difference_p": difference_p(study, cells),
         "cells": [
             {
                 study.rows.name: cell.row,
@@ -161,9 +214,12 @@ def _letters(study: Study) -> str:
     return f"{rows.capitalize()} x {columns}, {len(study.seeds)} seeds"
 
 
+def _axes(study: Study) -> list[str]:
+    return [setting_words(study.rows.name), setting_words(study.columns.name)]
+
+
 def _heads(study: Study, paper: Mapping[tuple[float, float], float]) -> list[str]:
-    names = [setting_words(study.rows.name), setting_words(study.columns.name)]
-    return [*names, *_HEADINGS, *(["paper [s]"] if paper else [])]
+    return [*_axes(study), *_HEADINGS, *(["paper [s]"] if paper else [])]
 
 
 def _words(cell: Cell, paper: Mapping[tuple[float, float], float]) -> list[str]:
@@ -212,7 +268,21 @@ def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float
         "sd is of the runs at GOAL. "
         "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
     )
-    return piped([_heads(study, paper), *(_words(cell, paper) for cell in cells)]) + f"\n\n{note}"
+    return piped(_full_lines(study, cells, paper)) + f"\n\n{note}"
+
+
+def _full_lines(
+    study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]
+) -> list[list[str]]:
+    """Return head and rows of the table, medians with their intervals."""
+    heads, median = _heads(study, paper), 2 + _HEADINGS.index("median [s]")
+    heads[median] = "median [s] (95 %)"
+    lines = [_words(cell, paper) for cell in cells]
+    for cell, line in zip(cells, lines, strict=True):
+        low, high = cell.median_interval_s
+        if not math.isnan(low):
+            line[median] += f" ({seconds(low)} to {seconds(high)})"
+    return [heads, *lines]
 
 
 def piped(lines: Sequence[Sequence[str]]) -> str:

@@ -12,8 +12,9 @@ from scipy import stats
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.results.arrival import median_share
-from gecar.results.quantile import quantile
-from gecar.results.study import Planned
+from gecar.results.quantile import median_interval, quantile
+from gecar.results.study import Planned, Study
+from gecar.search.settings import Settings
 
 Floats = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
@@ -70,6 +71,11 @@ class Cell:
         """Return a quantile of the times [s]; a run without GOAL counts as slower than any."""
         return float(quantile(self.times_s, share)) if self.records else float("nan")
 
+    @property
+    def median_interval_s(self) -> tuple[float, float]:
+        """An interval that holds the median with 95 % [s]; nan where there are too few runs for one."""
+        return median_interval(self.times_s)
+
     def figures(self) -> dict[str, Any]:
         """Sum up: runs, solved and times [s]; inf where too few runs reached GOAL, nan where none is finished."""
         times = self.times_s[np.isfinite(self.times_s)]
@@ -79,6 +85,8 @@ class Cell:
             "solved_share": self.solved / len(self.records) if self.records else float("nan"),
             "mean_s": self.mean_s,
             "median_s": self.quantile_s(0.5),
+            "median_low_s": self.median_interval_s[0],
+            "median_high_s": self.median_interval_s[1],
             "sd_solved_s": float(times.std(ddof=1)) if len(times) > 1 else float("nan"),
             "mean_solved_s": float(times.mean()) if len(times) else float("nan"),
             "best_s": self.quantile_s(0.0),
@@ -106,18 +114,36 @@ def cells_of(runs: Sequence[Planned], records: Sequence[Record | None]) -> list[
     return [Cell(row, column, tuple(kept)) for row, column, kept in found.values()]
 
 
-def difference_p(cells: Sequence[Cell]) -> float | None:
-    """Return the probability of differences this large between cells if the settings made none.
+TREATMENTS = {"preset", "grammar", *Settings.model_fields}
+"""What a study may vary and compare; courses, robots and the like are what it compares on."""
 
-    Friedman (1937), on ranks within each seed: runs of one seed begin with the same population, and a run without GOAL
-    is simply the slowest. None for less than three cells, two seeds that all of them have, or times that all agree.
+
+def problem_of(study: Study, cell: Cell) -> tuple[str, ...]:
+    """Return what a cell's runs were set: the value of each axis that is no treatment."""
+    axes = (study.rows.name, cell.row), (study.columns.name, cell.column)
+    return tuple(str(value) for name, value in axes if name not in TREATMENTS)
+
+
+def treatment_of(study: Study, cell: Cell) -> tuple[str, ...]:
+    """Return what a cell's runs did about it: the value of each axis that is a treatment."""
+    axes = (study.rows.name, cell.row), (study.columns.name, cell.column)
+    return tuple(str(value) for name, value in axes if name in TREATMENTS)
+
+
+def difference_p(study: Study, cells: Sequence[Cell]) -> float | None:
+    """Return the probability of differences this large between treatments if they made none.
+
+    Friedman (1937), on ranks within each problem and seed: runs of one seed begin with the same population, and a run
+    without GOAL is simply the slowest. None for less than three treatments, two blocks that all of them have, or times
+    that all agree.
     """
-    seeds = (
-        set.intersection(*({record["seed"] for record in cell.records} for cell in cells)) if cells else set()
-    )
-    times = [
-        [min(record["fitness_s"], UNSOLVED) for record in c.records if record["seed"] in seeds] for c in cells
-    ]
-    if len(cells) < 3 or len(seeds) < 2 or np.all(np.ptp(times, axis=0) == 0.0):
+    times: dict[tuple[str, ...], dict[Any, float]] = {}
+    for cell in cells:
+        found = times.setdefault(treatment_of(study, cell), {})
+        for record in cell.records:
+            found[problem_of(study, cell), record["seed"]] = min(record["fitness_s"], UNSOLVED)
+    blocks = sorted(set.intersection(*map(set, times.values()))) if times else []
+    table = [[found[block] for block in blocks] for found in times.values()]
+    if len(table) < 3 or len(blocks) < 2 or np.all(np.ptp(table, axis=0) == 0.0):
         return None
-    return float(stats.friedmanchisquare(*times).pvalue)
+    return float(stats.friedmanchisquare(*table).pvalue)

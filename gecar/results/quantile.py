@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 
 def quantile(times: npt.ArrayLike, share: float, axis: int | None = None) -> npt.NDArray[np.float64]:
@@ -22,3 +25,22 @@ def quantile(times: npt.ArrayLike, share: float, axis: int | None = None) -> npt
     """
     found: npt.NDArray[np.float64] = np.quantile(np.asarray(times, float), share, axis=axis, method="higher")
     return found
+
+
+def median_interval(times: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:
+    """Return an exact interval of a median, from the order of the times (`scipy.stats.quantile_test`).
+
+    Parameters
+    ----------
+    times
+        May be inf, where a run did not get there (runs,).
+    level
+        Its least coverage, 0..1. From five runs there is none of 95 %: (nan, nan).
+    """
+    values = np.asarray(times, float)
+    if not values.size:
+        return float("nan"), float("nan")
+    found = stats.quantile_test(values, q=0.0, p=0.5).confidence_interval(level)
+    return (
+        (float("nan"), float("nan")) if np.isnan([found.low, found.high]).any() else (found.low, found.high)
+    )

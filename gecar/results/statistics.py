@@ -1,4 +1,4 @@
-"""How the runs of two cells differ, as the field reports it: medians with intervals, a rank test, an effect size."""
+"""How the runs of two cells differ, as the field reports it: medians with intervals, rank tests, an effect size."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ from scipy import stats
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.results.cells import Cell
-from gecar.results.quantile import quantile
 
 Floats = npt.NDArray[np.float64]
-
-RESAMPLES = 9_999
 
 
 class Contrast(NamedTuple):
@@ -24,7 +21,10 @@ class Contrast(NamedTuple):
     Attributes
     ----------
     p
-        Two-sided Mann-Whitney test (1947): the probability of ranks this far apart if the two were alike.
+        Two-sided probability of ranks this far apart if the two were alike: of runs with the same seeds, which begin
+        alike, by Wilcoxon's signed ranks (1945; a tie counts half for either), of others by Mann and Whitney's (1947).
+    paired
+        Whether it was the former.
     a12
         Vargha and Delaney's effect size (2000): how often a run of the one is faster than one of the other, 0..1; equal
         times count half. They call 0.56 small, 0.64 medium, 0.71 large.
@@ -32,6 +32,7 @@ class Contrast(NamedTuple):
 
     p: float
     a12: float
+    paired: bool
 
 
 def contrast(cell: Cell, other: Cell) -> Contrast:
@@ -44,7 +45,12 @@ def contrast(cell: Cell, other: Cell) -> Contrast:
     """
     ours, theirs = (np.minimum(c.times_s, UNSOLVED) for c in (cell, other))
     test = stats.mannwhitneyu(ours, theirs, alternative="two-sided")
-    return Contrast(float(test.pvalue), 1.0 - float(test.statistic) / (len(ours) * len(theirs)))
+    a12 = 1.0 - float(test.statistic) / (len(ours) * len(theirs))
+    paired = [record["seed"] for record in cell.records] == [record["seed"] for record in other.records]
+    if not paired:
+        return Contrast(float(test.pvalue), a12, paired=False)
+    p = stats.wilcoxon(ours, theirs, zero_method="zsplit").pvalue if (ours != theirs).any() else 1.0
+    return Contrast(float(p), a12, paired=True)
 
 
 def holm(p: Sequence[float]) -> Floats:
@@ -54,22 +60,6 @@ def holm(p: Sequence[float]) -> Floats:
     corrected = np.empty(len(p))
     corrected[order] = np.minimum(np.maximum.accumulate(stepped), 1.0)
     return corrected
-
-
-def median_interval(values: Floats, level: float = 0.95) -> tuple[float, float]:
-    """Return a percentile bootstrap interval of a median (Efron 1979); equal values give equal intervals.
-
-    Parameters
-    ----------
-    values
-        At least one; may be inf (runs,).
-    level
-        Its coverage, 0..1.
-    """
-    draws = np.random.default_rng(0).integers(0, len(values), (RESAMPLES, len(values)))
-    medians = np.sort(quantile(values[draws], 0.5, axis=1))
-    tail = (1.0 - level) / 2.0
-    return float(medians[int(tail * RESAMPLES)]), float(medians[int((1.0 - tail) * RESAMPLES)])
 
 
 def evaluations_to(cell: Cell, time_s: float) -> Floats:

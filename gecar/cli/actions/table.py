@@ -24,7 +24,10 @@ from gecar.plots.runs.study_table import convergences, heat_map
 from gecar.plots.style import save
 from gecar.report.table import (
     as_table,
+    contrasted,
+    contrasts_csv,
     csv_text,
+    latex,
     markdown,
     paper_figures,
     runs_csv,
@@ -160,6 +163,10 @@ def _tell(
     write_whole(folder.path / "table.md", markdown(wanted, cells, paper, about))
     write_whole(folder.path / "table.csv", csv_text(wanted, cells, paper))
     write_whole(folder.path / "runs.csv", runs_csv(wanted, cells))
+    write_whole(folder.path / "table.tex", latex(wanted, cells, paper))
+    compared = contrasted(wanted, cells)
+    if compared:
+        write_whole(folder.path / "contrasts.csv", contrasts_csv(wanted, compared))
     write_whole(folder.path / "table.json", json_text(answer))
     drawn = draw(wanted, cells, paper, about, folder.path) if pictures else []
     warning = other_versions(records)
@@ -167,13 +174,13 @@ def _tell(
         print(f"warning: {warning}", file=sys.stderr)
     output.print()
     output.print(terminal_table(wanted, cells, paper))
-    p = difference_p(cells)
+    p = difference_p(wanted, cells)
     if p is not None:
         output.print(f"\nDo the cells differ at all? Friedman over the seeds: p = {p:.2g}")
     evaluations = sum(record["evaluations"] for record in records)
     busy = sum(record["wall_s"] for record in records)
     output.print(f"{evaluations:,} evaluations; {wall_s:.0f} s now, {busy:.0f} s of one worker in all")
-    output.print(f"\nTable:    {folder.path / 'table.md'}  (also .csv, .json, and runs.csv)")
+    output.print(f"\nTable:    {folder.path / 'table.md'}  (also .csv, .tex, .json, runs.csv, contrasts.csv)")
     for picture in drawn:
         output.print(f"Picture:  {picture}")
     output.print_json(
