@@ -224,13 +224,13 @@ class Mapped:
         """
         if not self.valid[i]:
             raise expected(f"genome {i}", "a derivation that does not finish", "a valid genome")
-        begins, numbers = self._written
+        begins, numbers = self.words
         words = self.mapper.words
         return "".join([words[k] for k in numbers[begins[i] : begins[i + 1]].tolist()])
 
     @cached_property
-    def _written(self) -> tuple[Int64s, Int32s]:
-        """The numbers of all derivations' words, and where each genome's begin."""
+    def words(self) -> tuple[Int64s, Int32s]:
+        """Where each genome's words begin (genomes + 1,), and the words as numbers in ``mapper.words`` (words,)."""
         return derivation.write_words(self.offsets, self.choices, self.valid, self.mapper.tables)
 
     def program(self, i: int) -> Program | None:
@@ -307,6 +307,12 @@ class Derivation:
     def text(self) -> str:
         """What stands there when no nonterminal is left."""
         return self.mapped.text(self.index)
+
+    @property
+    def words(self) -> Int32s:
+        """What the text is put together from, as numbers in ``mapped.mapper.words`` (words,)."""
+        begins, numbers = self.mapped.words
+        return numbers[begins[self.index] : begins[self.index + 1]]
 
     @property
     def tree(self) -> tuple[TreeNode, ...]:

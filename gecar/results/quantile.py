@@ -40,7 +40,6 @@ def median_interval(times: npt.ArrayLike, level: float = 0.95) -> tuple[float, f
     values = np.asarray(times, float)
     if not values.size:
         return float("nan"), float("nan")
-    found = stats.quantile_test(values, q=0.0, p=0.5).confidence_interval(level)
-    return (
-        (float("nan"), float("nan")) if np.isnan([found.low, found.high]).any() else (found.low, found.high)
-    )
+    interval: Any = stats.quantile_test(values, q=0.0, p=0.5).confidence_interval(level)
+    low, high = interval
+    return (float("nan"), float("nan")) if np.isnan([low, high]).any() else (float(low), float(high))
