@@ -164,8 +164,8 @@ class Breeder(Generic[P]):
             again = _duplicates(phenotypes, n_elites, simulated)
             if not again:
                 break
-            for kept, drawn in zip((genomes, parents, changed), draw(attempt), strict=True):
-                kept[again] = drawn[again]
+            drawn = draw(attempt)
+            genomes[again], parents[again], changed[again] = (each[again] for each in drawn)
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
         return Bred(genomes, phenotypes, parents, changed)

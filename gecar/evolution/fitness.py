@@ -166,7 +166,11 @@ class FitnessProblem(Problem[P]):
         """Make scores of what the function returned (programs, scores)."""
         scores = np.zeros(len(values), self.score_type)
         scores["values"], scores["draws"], scores["outcome"], scores["steps"] = values, 1, SCORED, 1
-        scores["merit"] = [self.fitness.merit(row) for row in values]
+        if self.fitness.overall is None:
+            whole = np.isfinite(values).all(axis=1)
+            scores["merit"] = np.where(whole, self.fitness.signs[0] * values[:, 0], math.inf)
+        else:
+            scores["merit"] = [self.fitness.merit(row) for row in values]
         scores["share"] = np.isfinite(scores["merit"])
         return scores
 

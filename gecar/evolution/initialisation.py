@@ -110,9 +110,12 @@ def _spelled(
     if not mapper.linear:
         raise expected("initialisation", "trees for a mapper of genes", "Uniform, or one of your own")
 
-    def write(genome: Genomes, mapper: Mapper, rng: Rng) -> int:
+    plan = Plan(mapper)
+
+    def write(genome: Genomes, mapper: Mapper, rng: Rng) -> int:  # noqa: ARG001
         # The ramp over sizes goes by the stream, not the place, so that an individual needs no other.
-        choices = choices_of(Plan(mapper, rng))[:codons]
+        plan.rng = rng
+        choices = choices_of(plan)[:codons]
         genome[: len(choices)] = choices
         return codons if tail is None else min(codons, len(choices) + round(tail * len(choices)))
 
@@ -134,20 +137,25 @@ def _random(
 
 
 class Plan:
-    """One derivation tree in the making.
+    """Derivation trees in the making.
 
     Parameters
     ----------
     mapper
         The grammar, and which nonterminals read a codon.
+
+    Attributes
+    ----------
     rng
         What chooses.
     """
 
-    def __init__(self, mapper: Mapper, rng: Rng) -> None:
-        self.grammar, self.reads, self.rng = mapper.grammar, mapper.tables.reads, rng
+    def __init__(self, mapper: Mapper) -> None:
+        self.grammar, self.reads = mapper.grammar, mapper.tables.reads
+        self.rng = np.random.default_rng(0)
         self.size = mapper.options.codon_size
         self._shortest: dict[int, int] = {}
+        self._fitting: dict[tuple[int, int, bool], npt.NDArray[np.intp]] = {}
 
     def options(self, symbol: int) -> npt.NDArray[np.intp]:
         """Productions of a nonterminal that a codon can choose."""
@@ -159,6 +167,16 @@ class Plan:
         options = self.options(symbol)
         depth = self.grammar.production_depth[options]
         return options[depth == depth.min()]
+
+    def fitting(self, symbol: int, left: int, full: bool) -> npt.NDArray[np.intp]:
+        """Productions that end within the depth left, or soonest; where it shall be full, those that grow, if any do."""
+        key = symbol, left, full
+        if key not in self._fitting:
+            options = self.options(symbol)
+            fitting = options[self.grammar.production_depth[options] <= left]
+            growing = fitting[self.grammar.production_recursive[fitting]] if full else fitting[:0]
+            self._fitting[key] = next(p for p in (growing, fitting, self.shallowest(symbol)) if len(p))
+        return self._fitting[key]
 
     def shortest(self, symbol: int) -> int:
         """Return how many codons a shallowest tree of a nonterminal reads."""
@@ -204,10 +222,7 @@ def _tree(plan: Plan, depth: int, full: bool, most: int) -> list[int]:
     waiting = [(0, depth)]
     while waiting and len(codons) <= most:
         symbol, left = waiting.pop()
-        options = plan.options(symbol)
-        fitting = options[plan.grammar.production_depth[options] <= left]
-        growing = fitting[plan.grammar.production_recursive[fitting]] if full else fitting[:0]
-        production = plan.pick(next(p for p in (growing, fitting, plan.shallowest(symbol)) if len(p)))
+        production = plan.pick(plan.fitting(symbol, left, full))
         codons += plan.codon(symbol, production)
         waiting += [(child, left - 1) for child in reversed(plan.children(production))]
     return codons
