@@ -169,7 +169,7 @@ class Plan:
         return options[depth == depth.min()]
 
     def fitting(self, symbol: int, left: int, full: bool) -> npt.NDArray[np.intp]:
-        """Productions that end within the depth left, or soonest; where it shall be full, those that grow, if any do."""
+        """Productions that end within the depth left, or soonest; where it shall be full, those that grow, if any."""
         key = symbol, left, full
         if key not in self._fitting:
             options = self.options(symbol)
