@@ -15,7 +15,8 @@ def test_a_table_is_written_in_every_form(gecar, tmp_path):
     assert [cell["runs"] for cell in answer["cells"]] == [2, 2, 2, 2]
     names = {path.name for path in (tmp_path / "new").iterdir()}
     pictures = {"convergence.png", "heat_map.png"}
-    assert names == {"study.json", "runs", "table.md", "table.csv", "table.json", "runs.csv"} | pictures
+    tables = {"table.md", "table.csv", "table.tex", "table.json", "runs.csv", "contrasts.csv"}
+    assert names == {"study.json", "runs"} | tables | pictures
     assert len(list((tmp_path / "new/runs").iterdir())) == 8
 
 
