@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from rich.markup import escape
 from rich.table import Table
 
+from gecar.files import json_ready
 from gecar.results.arrival import percent, share_of
 from gecar.results.cells import Cell, difference_p, problem_of
 from gecar.results.statistics import Contrast, contrast, holm
@@ -161,7 +162,7 @@ def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, fl
     out = csv.writer(stream, lineterminator="\n")
     out.writerow([study.rows.name, study.columns.name, *cells[0].figures(), *(["paper_s"] if paper else [])])
     for cell in cells:
-        figures = [*cell.figures().values(), *([_number(of_paper(cell, paper))] if paper else [])]
+        figures = [*cell.figures().values(), *([json_ready(of_paper(cell, paper))] if paper else [])]
         out.writerow([cell.row, cell.column, *map(_csv, figures)])
     return stream.getvalue()
 
