@@ -105,6 +105,13 @@ def kernel(function: F) -> F:
     return dispatcher
 
 
+def subroutine(function: F) -> F:
+    """Compile a function as `kernel` does, but let it stay a function: what is long and called from several places."""
+    njit: Any = numba.njit
+    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)
+    return dispatcher
+
+
 def _on_stack(typing_context: Any, record: Any) -> Any:  # noqa: ARG001
     """Return the type of `on_stack`, and what generates its code; see `numba.extending.intrinsic`."""
 
@@ -126,6 +133,25 @@ step of the simulation takes a seventh less time so.
 """
 
 
+def _blank(typing_context: Any, dtype: Any) -> Any:  # noqa: ARG001
+    """Return the type of `blank`, and what generates its code."""
+    record = dtype.dtype if isinstance(dtype, types.DType) else dtype
+
+    def make(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:  # noqa: ARG001
+        return cgutils.alloca_once(builder, context.get_value_type(record).pointee)  # type: ignore[no-untyped-call]
+
+    return record(dtype), make
+
+
+blank: Any = intrinsic(_blank)
+"""Return a record of a dtype, for kernels, with nothing set; it lives as long as the kernel it is made in."""
+
+
+def numbers(dtype: np.dtype[Any]) -> list[str]:
+    """Return the fields of a record that are numbers, not arrays."""
+    return [name for name in dtype.names or () if not dtype[name].shape]
+
+
 def lane_access(dtype: np.dtype[Any], first: int) -> tuple[Any, Any]:
     """Return what copies a record out of and into one lane of a flat array, for kernels.
 
@@ -136,7 +162,7 @@ def lane_access(dtype: np.dtype[Any], first: int) -> tuple[Any, Any]:
     Parameters
     ----------
     dtype
-        The record's; all its fields are float64.
+        The record's; its numbers are float64, and arrays in it stay where they are.
     first
         How many fields of other records stand before it.
 
@@ -146,7 +172,8 @@ def lane_access(dtype: np.dtype[Any], first: int) -> tuple[Any, Any]:
         ``load(flat, lanes, lane)`` returns the record; ``store(flat, lanes, lane, record)`` copies it back.
     """
     record = numba.from_dtype(dtype)
-    fields = [(first + k, 8 * k) for k in range(len(dtype.names or ()))]
+    offsets = {name: place[1] for name, place in (dtype.fields or {}).items()}
+    fields = [(first + k, offsets[name]) for k, name in enumerate(numbers(dtype))]
 
     def places(context: Any, builder: Any, array_type: Any, arguments: Any, slot: Any) -> Any:
         array, lanes, lane = arguments

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gecar.world.ports import N_TERMS, TERM_WIDTH
+
 DEG = math.pi / 180.0
 
 
@@ -327,4 +329,8 @@ _CONSTANTS = (
 )  # fmt: skip
 
 PHYSICS_FIELDS = _CONSTANTS + tuple(p.field for effect in CATALOGUE for p in effect.parameters)
-PHYSICS = np.dtype([(field, np.float64) for field in PHYSICS_FIELDS])
+PHYSICS = np.dtype(
+    [(field, np.float64) for field in (*PHYSICS_FIELDS, "n_terms")]
+    + [("terms", np.float64, (N_TERMS, TERM_WIDTH))]
+)
+"""A robot as the kernels take it: constants, effects, and terms, each a row as `gecar.world.ports` lays it out."""

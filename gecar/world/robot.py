@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,9 +12,12 @@ import numpy.typing as npt
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from gecar.compiled import numbers
 from gecar.errors import InputError, first_fault, one_of
 from gecar.files import is_file, read_toml, write_whole
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS, Parameter
+from gecar.world.ports import N_TERMS
+from gecar.world.terms import Term, rows_of
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -100,7 +103,7 @@ class Robot(_Section):
     """A robot: its constants, and the catalogue effects it has.
 
     ``effects`` maps an effect's id to its parameters by label, as in
-    ``[effects.backlash]`` / ``angle_deg = 5.6``.
+    ``[effects.backlash]`` / ``angle_deg = 5.6``. ``term`` holds physics of no catalogue, as laws: ``[[term]]``.
     """
 
     name: str
@@ -111,6 +114,7 @@ class Robot(_Section):
     tyre: Tyre
     colour_sensor: ColourSensor
     effects: Mapping[str, Mapping[str, float]] = {}
+    term: Annotated[tuple[Term, ...], Field(max_length=N_TERMS)] = ()
 
     @model_validator(mode="after")
     def _known_effects(self) -> Robot:
@@ -130,8 +134,10 @@ class Robot(_Section):
         for effect_id, values in self.effects.items():
             labels = {p.label: p for p in BY_ID[effect_id].parameters}
             own.update({labels[label].field: value * labels[label].si for label, value in values.items()})
-        for field in PHYSICS.names or ():
+        own["n_terms"] = len(self.term)
+        for field in numbers(PHYSICS):
             record[field] = own[field]
+        record["terms"] = rows_of(self.term)
         return record
 
     def _own_constants(self) -> dict[str, float]:
@@ -178,6 +184,10 @@ class Robot(_Section):
             except ValueError as error:
                 raise InputError(f"effect {effect_id}: {error}") from None
         return self.model_copy(update={"effects": {**self.effects, **effects}})
+
+    def with_terms(self, terms: Sequence[Term]) -> Robot:
+        """Return this robot with other terms, at most `N_TERMS`."""
+        return self.model_copy(update={"term": tuple(terms)})
 
     def _check_effect(self, effect_id: str, values: Mapping[str, float]) -> None:
         if effect_id not in BY_ID:
@@ -269,7 +279,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that `read_robot` reads back to an equal robot."""
-    table = robot.model_dump()
+    table = robot.model_dump(exclude={"term"})
     if not table["effects"]:
         del table["effects"]
-    write_whole(path, tomli_w.dumps(table))
+    terms = [f"\n[[term]]\n{tomli_w.dumps(term.as_table())}" for term in robot.term]
+    write_whole(path, tomli_w.dumps(table) + "".join(terms))

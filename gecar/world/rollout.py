@@ -16,10 +16,12 @@ from gecar.world.course.course import Course
 from gecar.world.kernel.chipmunk import NO_ENGINE
 from gecar.world.kernel.conditions import Conditions, conditions, select
 from gecar.world.kernel.drive import Setup, drive
+from gecar.world.kernel.dynamics import has_terms
 from gecar.world.kernel.interpreter import CONTROL, EYES, Floor
 from gecar.world.kernel.lanes import Ends, Jobs, drive_lanes, make_memory
 from gecar.world.kernel.sensing import RING
 from gecar.world.kernel.state import STATE
+from gecar.world.kernel.terms import STORES
 from gecar.world.pymunk_space import build_engine
 from gecar.world.robot import Robot
 
@@ -212,6 +214,7 @@ class Driver:
             np.zeros(1, CONTROL),
             eyes,
             np.zeros(2 * RING),
+            np.zeros(1, STORES),
             NO_ENGINE,
         )
 
@@ -268,7 +271,10 @@ SUMMARY = np.dtype([("outcome", np.int8), ("time_s", float), ("checkpoints", np.
 
 
 class Fleet:
-    """One course's arrays, made once, and many drives at a time: in lanes, or one by one where something is touched."""
+    """One course's arrays, made once, and many drives at a time.
+
+    In lanes; or one by one where something is touched, or the robot has terms.
+    """
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -310,7 +316,7 @@ class Fleet:
         n = len(which)
         arrival = np.full((n, len(self.floor.sequence)), np.nan)
         ends = Ends(np.zeros(n, np.int8), np.zeros(n, np.int64), np.zeros(n, np.int32), arrival)
-        if self.world.uses_pymunk:
+        if self.world.uses_pymunk or has_terms(under.physics).any():
             self._drive_one_by_one(jobs, under, ends)
         else:
             drive_lanes(jobs, under, self.floor, self._memory, ends)
@@ -321,7 +327,7 @@ class Fleet:
         return summary, ends.arrival_s
 
     def _drive_one_by_one(self, jobs: Jobs, under: Conditions, ends: Ends) -> None:
-        """Make all drives, each with an engine of its own; ``ends`` is filled as by `drive_lanes`."""
+        """Make all drives, each with arrays of its own; ``ends`` is filled as by `drive_lanes`."""
         drivers = {row: Driver(self.world, select(under, [row])) for row in set(jobs.condition.tolist())}
         for k, (program, row) in enumerate(zip(jobs.program, jobs.condition.tolist(), strict=True)):
             opcodes = jobs.rows[jobs.first_row[program] : jobs.first_row[program + 1]]

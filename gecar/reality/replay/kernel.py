@@ -30,7 +30,7 @@ from gecar.reality.replay.pose_filter import (
     predict_pose,
     rebase,
 )
-from gecar.world.kernel.dynamics import is_plain
+from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, is_plain, step_with_terms
 from gecar.world.kernel.lock_step import (
     LANES,
     N_FIELDS,
@@ -47,6 +47,15 @@ from gecar.world.kernel.lock_step import (
 )
 from gecar.world.kernel.motor import bench_step, supply
 from gecar.world.kernel.state import derive, place
+from gecar.world.kernel.terms import (
+    PORT_ENCODER,
+    PORT_GYRO,
+    PORT_POSE_HEADING,
+    PORT_POSE_X,
+    PORT_POSE_Y,
+    STORES,
+    reading_error,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -214,68 +223,108 @@ def _keep(flat: Array, first: int, predicted: Array, errors: Array, row: int) ->
 
 
 @kernel
-def _replay(
-    inputs: KernelInput,
-    physics: npt.NDArray[Any],
-    start: Array,
-    offset: float,
-    dt: float,
-    flat: Array,
-    weights: Array,
-    kept: Kept,
-    lanes: int,
-    effects: bool,
-) -> None:
-    _begin(physics, start, dt, flat, lanes)
-    shared = physics[0]
-    cap, delay = shared.duty_cap, shared.actuation_delay
-    stretch = 1.0 / (1.0 + shared.clock_skew)
-    late = shared.pose_delay + offset
-    weights[:] = 0.0
-    before = 0.0
-    i = j = n = 0
-    at = -1
-    while True:
-        now = n * dt
-        while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
-            _weigh(i, inputs, weights)
-            _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes)
-            _keep(flat, _OF_ROW * lanes, kept.rows, kept.row_errors, i)
-            i += 1
-        while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
-            back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if n > 0 else 0.0
-            _compare_pose(j, back, max(inputs.pose_t[j] - before, 0.0), inputs, flat, lanes)
-            _keep(flat, _OF_POSE * lanes, kept.poses, kept.pose_errors, j)
-            before = inputs.pose_t[j]
-            j += 1
-        if (i == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
-            return
-        # Velocities live at mid-step: commands from the last middle to this one, less the delay, on the log's clock.
-        begin = ((n - 0.5) * dt - delay) / stretch
-        end = ((n + 0.5) * dt - delay) / stretch
-        while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
-            at += 1
-        share = stretch / dt
-        left = _held(inputs.commands, inputs.t, 0, at, begin, end, cap) * share
-        right = _held(inputs.commands, inputs.t, 1, at, begin, end, cap) * share
-        _advance(left, right, inputs.bench, flat, lanes, effects)
-        n += 1
+def _off(flat: Array, laws: Any, stores: Any, off: Array) -> None:
+    """Set what terms add to a row's left angle, right angle, battery and yaw rate, shape (4,)."""
+    s, p = load_state(flat, 1, 0), load_physics(flat, 1, 0)
+    off[0] = reading_error(PORT_ENCODER, 0, s, p, laws)
+    off[1] = reading_error(PORT_ENCODER, 1, s, p, laws)
+    off[2] = stores.supply_voltage
+    off[3] = reading_error(PORT_GYRO, 0, s, p, laws)
 
 
-def _replay_kernel(lanes: int, effects: bool) -> Any:
-    """Return the compiled replay of so many robots, with effects or plain ones."""
+@kernel
+def _pose_off(flat: Array, laws: Any, off: Array) -> None:
+    """Set what terms add to a pose, shape (3,) of the four."""
+    s, p = load_state(flat, 1, 0), load_physics(flat, 1, 0)
+    off[0] = reading_error(PORT_POSE_X, 0, s, p, laws)
+    off[1] = reading_error(PORT_POSE_Y, 0, s, p, laws)
+    off[2] = reading_error(PORT_POSE_HEADING, 0, s, p, laws)
 
-    def replay(
+
+@kernel
+def _shift(values: Array, row: int, count: int, off: Array, sign: float) -> None:
+    """Add to the first few numbers of a row."""
+    for k in range(count):
+        values[row, k] += sign * off[k]
+
+
+@kernel
+def _advance_with_terms(left: float, right: float, bench: bool, laws: Any, stores: Any, flat: Array) -> None:
+    """Advance a robot with terms by one step."""
+    s, c = load_state(flat, 1, 0), load_derived(flat, 1, 0)
+    if bench:
+        bench_step_with_terms(s, left, right, laws, c, stores)
+    else:
+        step_with_terms(s, left, right, laws, c, stores)
+        drift(s, c)
+    store_state(flat, 1, 0, s)
+    store_derived(flat, 1, 0, c)
+
+
+def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # noqa: C901
+    """Return the compiled replay of so many robots, with effects or plain ones; or of one with terms.
+
+    With terms ``inputs`` is overwritten: what they add to a reading is taken off what was measured.
+    """
+
+    def replay(  # noqa: C901
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
-        flat: Array, weights: Array, kept: Kept,
+        flat: Array, weights: Array, stores: npt.NDArray[Any], kept: Kept,
     ) -> None:  # fmt: skip
-        _replay(inputs, physics, start, offset, dt, flat, weights, kept, lanes, effects)
+        _begin(physics, start, dt, flat, lanes)
+        shared = physics[0]
+        cap, delay = shared.duty_cap, shared.actuation_delay
+        stretch = 1.0 / (1.0 + shared.clock_skew)
+        late = shared.pose_delay + offset
+        before = 0.0
+        i = j = n = 0
+        at = -1
+        off = weights[4:]
+        while True:
+            now = n * dt
+            while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
+                if terms:
+                    _off(flat, shared, stores[0], off)
+                    _shift(inputs.measured, i, 4, off, -1.0)
+                _weigh(i, inputs, weights)
+                _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes)
+                _keep(flat, _OF_ROW * lanes, kept.rows, kept.row_errors, i)
+                if terms and kept.rows.shape[0] > 0:
+                    _shift(kept.rows, i, 4, off, 1.0)
+                i += 1
+            while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
+                back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if n > 0 else 0.0
+                if terms:
+                    _pose_off(flat, shared, off)
+                    _shift(inputs.pose, j, 3, off, -1.0)
+                _compare_pose(j, back, max(inputs.pose_t[j] - before, 0.0), inputs, flat, lanes)
+                _keep(flat, _OF_POSE * lanes, kept.poses, kept.pose_errors, j)
+                if terms and kept.poses.shape[0] > 0:
+                    _shift(kept.poses, j, 3, off, 1.0)
+                before = inputs.pose_t[j]
+                j += 1
+            if (i == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
+                return
+            # Velocities live at mid-step: commands from the last middle to this one, less delay, on the log's clock.
+            begin = ((n - 0.5) * dt - delay) / stretch
+            end = ((n + 0.5) * dt - delay) / stretch
+            while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
+                at += 1
+            share = stretch / dt
+            left = _held(inputs.commands, inputs.t, 0, at, begin, end, cap) * share
+            right = _held(inputs.commands, inputs.t, 1, at, begin, end, cap) * share
+            if terms:
+                _advance_with_terms(left, right, inputs.bench, shared, stores[0], flat)
+            else:
+                _advance(left, right, inputs.bench, flat, lanes, effects)
+            n += 1
 
     return kernel(replay)
 
 
 _replay_one = _replay_kernel(1, effects=True)
 _replay_lanes, _replay_plain_lanes = _replay_kernel(LANES, effects=True), _replay_kernel(LANES, effects=False)
+_replay_with_terms = _replay_kernel(1, effects=True, terms=True)
 
 
 def replay_rows(
@@ -288,7 +337,7 @@ def replay_rows(
     inputs
         The recording.
     physics
-        Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`.
+        Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`, and of several none has terms.
     start
         Start pose of the axle's centre [m, m, rad], shape (3,).
     offset
@@ -301,6 +350,13 @@ def replay_rows(
     lanes, n, m = len(physics), len(inputs.t), len(inputs.pose_t)
     shapes = (n * predictions, ROW_COLUMNS), (n, 4), (m * predictions, 3), (m, 3)
     kept = Kept(*(np.empty((rows, columns * lanes)) for rows, columns in shapes))
-    play = _replay_one if lanes == 1 else _replay_plain_lanes if is_plain(physics).all() else _replay_lanes
-    play(inputs, physics, start, offset, dt, lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(4), kept)
+    if lanes == 1 and has_terms(physics)[0]:
+        play = _replay_with_terms
+        inputs = inputs._replace(measured=inputs.measured.copy(), pose=inputs.pose.copy())
+    elif lanes == 1:
+        play = _replay_one
+    else:
+        play = _replay_plain_lanes if is_plain(physics).all() else _replay_lanes
+    flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(1, STORES)
+    play(inputs, np.ascontiguousarray(physics), start, offset, dt, flat, np.zeros(8), stores, kept)
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from gecar.compiled import compiled
 from gecar.world.kernel.sensing import spot_reflection
+from gecar.world.kernel.terms import colour_error
 
 Array = npt.NDArray[np.float64]
 
@@ -103,4 +104,7 @@ def readings_along(
             slope = (seen - before) / elapsed
             now = seen - slope * p.sensor_lag + (now - before + slope * p.sensor_lag) * keep
         before = seen
-        readings[i] = _clipped_mean(p.sensor_gain * now + p.sensor_offset, noise)
+        level = p.sensor_gain * now + p.sensor_offset
+        if p.n_terms > 0.0:
+            level += colour_error(t[i], pose[0] + shift[0], pose[1] + shift[1], heading, level, p)
+        readings[i] = _clipped_mean(level, noise)

@@ -223,10 +223,16 @@ def replayer_of(
 
 
 def _in_step(physics: npt.NDArray[Any]) -> Iterator[list[int]]:
-    """Yield which records to replay together: up to `LANES` that share `TIMING`, plain ones apart; few one by one."""
+    """Yield which records to replay together: up to `LANES` that share `TIMING`, plain ones apart.
+
+    Few are replayed one by one, and so are those with terms.
+    """
     alike: dict[Any, list[int]] = {}
     for number, key in enumerate(zip(physics[list(TIMING)].tolist(), is_plain(physics), strict=True)):
-        alike.setdefault(key, []).append(number)
+        if physics["n_terms"][number] > 0.0:
+            yield [number]
+        else:
+            alike.setdefault(key, []).append(number)
     for numbers in alike.values():
         for first in range(0, len(numbers), LANES):
             some = numbers[first : first + LANES]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from gecar.compiled import kernel, on_stack
 from gecar.world.kernel.chipmunk import SPACE, EngineArrays, engine_step
-from gecar.world.kernel.dynamics import drift, step, turn
+from gecar.world.kernel.dynamics import drift, has_terms, step, step_with_terms, turn
 from gecar.world.kernel.interpreter import Floor, first_step_after, look, run_program, see
 from gecar.world.kernel.sensing import RING, delayed
 from gecar.world.kernel.state import place
@@ -35,6 +35,8 @@ class Setup(NamedTuple):
         Of dtypes `STATE`, `CONTROL` and `EYES`, shape (1,).
     commands
         Commands remembered for the actuation delay, shape (2 RING,).
+    stores
+        Of the robot's terms, dtype `STORES`, shape (1,).
     engine
         pymunk's, or `NO_ENGINE`.
     """
@@ -49,6 +51,7 @@ class Setup(NamedTuple):
     control: npt.NDArray[Any]
     eyes: npt.NDArray[Any]
     commands: npt.NDArray[np.float64]
+    stores: npt.NDArray[Any]
     engine: EngineArrays
 
 
@@ -66,15 +69,39 @@ def advance(
     """Advance robot (and engine, if any) from step ``n`` to the next under the commands issued now.
 
     ``commands``, shape (2 RING,), remembers commands for the actuation delay, and for the half step that velocities
-    lag positions in `gecar.world.kernel.dynamics.step`. The cap on duty acts here.
+    lag positions in `gecar.world.kernel.dynamics.step`. The cap on duty acts here. Terms do not: see
+    `advance_with_terms`.
     """
-    left = min(max(left_duty, -p.duty_cap), p.duty_cap)
-    right = min(max(right_duty, -p.duty_cap), p.duty_cap)
+    left, right = _acting(n, left_duty, right_duty, p, c, commands)
+    step(s, left, right, p, c)
+    _move(s, c, engine)
+
+
+@kernel
+def advance_with_terms(
+    n: int, s: Any, left_duty: float, right_duty: float, p: Any, c: Any, setup: Setup
+) -> None:
+    """Do the same for a robot with terms."""
+    left, right = _acting(n, left_duty, right_duty, p, c, setup.commands)
+    step_with_terms(s, left, right, p, c, setup.stores[0])
+    _move(s, c, setup.engine)
+
+
+@kernel
+def _acting(
+    n: int, left_duty: float, right_duty: float, p: Any, c: Any, commands: npt.NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the commands that act in a step, after cap and delay."""
     if n == 0:
         commands[:] = 0.0
-    commands[n & (RING - 1)] = left
-    commands[RING + (n & (RING - 1))] = right
-    step(s, delayed(commands, 0, n, c.late), delayed(commands, RING, n, c.late), p, c)
+    commands[n & (RING - 1)] = min(max(left_duty, -p.duty_cap), p.duty_cap)
+    commands[RING + (n & (RING - 1))] = min(max(right_duty, -p.duty_cap), p.duty_cap)
+    return delayed(commands, 0, n, c.late), delayed(commands, RING, n, c.late)
+
+
+@kernel
+def _move(s: Any, c: Any, engine: EngineArrays) -> None:
+    """Move the body with its new velocity: by the engine, if there is any."""
     if engine.addresses[SPACE] != 0:
         turn(s, engine_step(s, c.dt, engine) - s.half_turn)
     else:
@@ -146,7 +173,73 @@ def enter_tile(
     return arrive(tile, passed, n * c.dt, floor, arrival)
 
 
-@kernel
+def _drive_kernel(terms: bool) -> Any:  # noqa: C901
+    """Return the compiled drive of robots with terms, or without; compiled when first called."""
+
+    def drive_on(
+        program: npt.NDArray[np.int32], setup: Setup, s: Any, first: int, last: int, passed: int,
+        arrival: npt.NDArray[np.float64], trace: npt.NDArray[np.float64], every: int,
+    ) -> tuple[int, int, int]:  # fmt: skip
+        p, c, k, e, floor = setup.physics[0], setup.derived[0], setup.control[0], setup.eyes[0], setup.floor
+        if first == 0:
+            place(s, p, setup.start[0], setup.start[1], setup.start[2])
+            begin_program(k, setup.phase_ms, c.dt, s, p, floor)
+        remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
+        for n in range(first, last):
+            k.step = n
+            outcome, passed = enter_tile(n, s, p, c, k, floor, passed, arrival)
+            if outcome == RUNNING and n >= setup.limit:
+                outcome = OUT_OF_TIME
+            if outcome == RUNNING:
+                if remembers:
+                    look(n, s, p, c.dt, floor, e)
+                waits = n < k.due_step and k.until < 0
+                if not waits and not run_program(program, k, s, p, c.dt, floor, e):
+                    outcome = STUCK
+            if trace.shape[0] > 0 and (n % every == 0 or outcome != RUNNING):
+                _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
+            if outcome != RUNNING:
+                return outcome, n, passed
+            if terms:
+                advance_with_terms(n, s, k.left_duty, k.right_duty, p, c, setup)
+            else:
+                advance(n, s, k.left_duty, k.right_duty, p, c, setup.commands, setup.engine)
+        return RUNNING, last, passed
+
+    on = kernel(drive_on)
+
+    def drive(
+        program: npt.NDArray[np.int32], setup: Setup, first: int, last: int, passed: int,
+        arrival: npt.NDArray[np.float64], trace: npt.NDArray[np.float64], every: int,
+    ) -> tuple[int, int, int]:  # fmt: skip
+        s = on_stack(setup.state[0])
+        result = on(program, setup, s, first, last, passed, arrival, trace, every)
+        setup.state[0] = s
+        return result
+
+    return kernel(drive)
+
+
+def _hold_kernel(terms: bool) -> Any:
+    """Return the compiled `hold_duties` of robots with terms, or without."""
+
+    def hold(first: int, last: int, left_duty: float, right_duty: float, setup: Setup) -> None:
+        p, c, s, e = setup.physics[0], setup.derived[0], setup.state[0], setup.eyes[0]
+        for n in range(first, last):
+            look(n, s, p, c.dt, setup.floor, e)
+            if terms:
+                advance_with_terms(n, s, left_duty, right_duty, p, c, setup)
+            else:
+                advance(n, s, left_duty, right_duty, p, c, setup.commands, setup.engine)
+        look(last, s, p, c.dt, setup.floor, e)
+
+    return kernel(hold)
+
+
+_drive_without, _drive_with = _drive_kernel(terms=False), _drive_kernel(terms=True)
+_hold_without, _hold_with = _hold_kernel(terms=False), _hold_kernel(terms=True)
+
+
 def drive(
     program: npt.NDArray[np.int32],
     setup: Setup,
@@ -164,55 +257,17 @@ def drive(
     tuple
         (outcome, step it ended at, tiles of the sequence passed).
     """
-    s = on_stack(setup.state[0])
-    result = _drive(program, setup, s, first, last, passed, arrival, trace, every)
-    setup.state[0] = s
+    chosen = _drive_with if has_terms(setup.physics)[0] else _drive_without
+    if first == 0:
+        setup.stores.fill(0)
+    result: tuple[int, int, int] = chosen(program, setup, first, last, passed, arrival, trace, every)
     return result
 
 
-@kernel
-def _drive(
-    program: npt.NDArray[np.int32],
-    setup: Setup,
-    s: Any,
-    first: int,
-    last: int,
-    passed: int,
-    arrival: npt.NDArray[np.float64],
-    trace: npt.NDArray[np.float64],
-    every: int,
-) -> tuple[int, int, int]:
-    p, c, k, e, floor = setup.physics[0], setup.derived[0], setup.control[0], setup.eyes[0], setup.floor
-    if first == 0:
-        place(s, p, setup.start[0], setup.start[1], setup.start[2])
-        begin_program(k, setup.phase_ms, c.dt, s, p, floor)
-    remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
-    for n in range(first, last):
-        k.step = n
-        outcome, passed = enter_tile(n, s, p, c, k, floor, passed, arrival)
-        if outcome == RUNNING and n >= setup.limit:
-            outcome = OUT_OF_TIME
-        if outcome == RUNNING:
-            if remembers:
-                look(n, s, p, c.dt, floor, e)
-            waits = n < k.due_step and k.until < 0
-            if not waits and not run_program(program, k, s, p, c.dt, floor, e):
-                outcome = STUCK
-        if trace.shape[0] > 0 and (n % every == 0 or outcome != RUNNING):
-            _sample(trace, (n + every - 1) // every, n * c.dt, s, k, p, floor)
-        if outcome != RUNNING:
-            return outcome, n, passed
-        advance(n, s, k.left_duty, k.right_duty, p, c, setup.commands, setup.engine)
-    return RUNNING, last, passed
-
-
-@kernel
 def hold_duties(first: int, last: int, left_duty: float, right_duty: float, setup: Setup) -> None:
     """Hold two commands from step ``first`` to step ``last``, whoever gave them; at step 0 from the start pose."""
-    p, c, s, e = setup.physics[0], setup.derived[0], setup.state[0], setup.eyes[0]
     if first == 0:
-        place(s, p, setup.start[0], setup.start[1], setup.start[2])
-    for n in range(first, last):
-        look(n, s, p, c.dt, setup.floor, e)
-        advance(n, s, left_duty, right_duty, p, c, setup.commands, setup.engine)
-    look(last, s, p, c.dt, setup.floor, e)
+        setup.stores.fill(0)
+        place(setup.state[0], setup.physics[0], *setup.start)
+    hold = _hold_with if has_terms(setup.physics)[0] else _hold_without
+    hold(first, last, left_duty, right_duty, setup)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import kernel
+from gecar.compiled import blank, kernel
 from gecar.world.kernel.contacts import release_contacts, sweep
 from gecar.world.kernel.motor import (
     awake,
@@ -26,8 +26,11 @@ from gecar.world.kernel.motor import (
     regulate,
     slewed,
     supply,
+    turn_bare_shafts,
 )
 from gecar.world.kernel.series import small_cosine, small_sine
+from gecar.world.kernel.state import roll_on
+from gecar.world.kernel.terms import ASKED, ask
 
 STILL = 1e-15  # m/s and rad/s
 
@@ -47,12 +50,18 @@ def is_plain(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     physics
         Records of dtype `PHYSICS`, shape (n,).
     """
-    plain = np.ones(len(physics), np.bool_)
+    plain: npt.NDArray[np.bool_] = ~has_terms(physics)
     for field in _EFFECT_FIELDS:
         plain &= physics[field] == 0.0
     for field in _EFFECT_LIMITS:
         plain &= physics[field] == np.inf
     return plain
+
+
+def has_terms(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return whether robots have terms, shape (n,): then a step is `step_with_terms`."""
+    found: npt.NDArray[np.bool_] = physics["n_terms"] > 0.0
+    return found
 
 
 @kernel
@@ -87,7 +96,83 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
     bool
         Whether another sweep would change nothing.
     """
-    # Solving along the heading at mid-step makes the path second order in the step.
+    _enter_step(s, c, effects)
+    s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
+    _run_motors(s, left_duty, right_duty, p, c, effects)
+    _set_budgets(s, p, c, effects)
+    release_contacts(s)
+    return sweep(s, c, effects)
+
+
+@kernel
+def step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, stores: Any) -> None:
+    """Advance a robot with terms by one step, as `step` does; what they ask for enters at the ports.
+
+    Parameters
+    ----------
+    s, left_duty, right_duty
+        As in `step`.
+    p
+        Record of dtype `PHYSICS` with the terms.
+    c
+        Record of dtype `DERIVED`; terms may change the radii in it.
+    stores
+        Record of dtype `gecar.world.kernel.terms.STORES`, updated.
+    """
+    asked = blank(ASKED)
+    _enter_step(s, c, True)
+    ask(s, left_duty, right_duty, p, c, stores, asked)
+    if asked.radius_terms > 0.0:
+        roll_on(p, asked.left_radius, asked.right_radius, c)
+    _force(s, asked, c)
+    s.voltage = supply(s, p) + asked.supply_voltage
+    _run_motors(s, left_duty + asked.left_command, right_duty + asked.right_command, p, c, True)
+    s.left_speed += asked.left_torque * c.dt * c.inv_rotor
+    s.right_speed += asked.right_torque * c.dt * c.inv_rotor
+    _set_budgets(s, p, c, True)
+    s.left_dry = max(s.left_dry + asked.left_friction * c.dt, 0.0)
+    s.right_dry = max(s.right_dry + asked.right_friction * c.dt, 0.0)
+    grip = _grip(s, p) * c.dt
+    s.left_circle = max(s.left_circle + grip * asked.left_load, 0.0) * max(1.0 + asked.left_grip, 0.0)
+    s.right_circle = max(s.right_circle + grip * asked.right_load, 0.0) * max(1.0 + asked.right_grip, 0.0)
+    release_contacts(s)
+    if not sweep(s, c, True) and not sweep(s, c, True):
+        sweep(s, c, True)
+    end_step(s, p, c, True)
+
+
+@kernel
+def bench_step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, stores: Any) -> None:
+    """Advance the shafts of a robot with terms on a bench, as `gecar.world.kernel.motor.bench_step` does."""
+    asked = blank(ASKED)
+    ask(s, left_duty, right_duty, p, c, stores, asked)
+    s.voltage = supply(s, p) + asked.supply_voltage
+    turn_bare_shafts(
+        s,
+        left_duty + asked.left_command,
+        right_duty + asked.right_command,
+        asked.left_torque,
+        asked.right_torque,
+        asked.left_friction,
+        asked.right_friction,
+        p,
+        c,
+    )
+
+
+@kernel
+def _force(s: Any, asked: Any, c: Any) -> None:
+    """Let forces act on the body for a step."""
+    ahead = asked.force_ahead + asked.force_x * s.cos + asked.force_y * s.sin
+    aside = asked.force_aside + asked.force_y * s.cos - asked.force_x * s.sin
+    s.u += ahead * c.dt * c.inv_mass
+    s.w += aside * c.dt * c.inv_mass
+    s.yaw_rate += asked.yaw_moment * c.dt * c.inv_inertia
+
+
+@kernel
+def _enter_step(s: Any, c: Any, effects: bool) -> None:
+    """Set the velocities ahead and to the left, along the heading at mid-step: the path is then second order in it."""
     s.half_turn = 0.5 * c.dt * s.yaw_rate
     turn(s, s.half_turn)
     if effects:
@@ -95,10 +180,6 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
         s.vy += c.tilt_y
     s.u = s.vx * s.cos + s.vy * s.sin
     s.w = s.vy * s.cos - s.vx * s.sin
-    _run_motors(s, left_duty, right_duty, p, c, effects)
-    _set_budgets(s, p, c, effects)
-    release_contacts(s)
-    return sweep(s, c, effects)
 
 
 @kernel
@@ -145,8 +226,7 @@ def turn(s: Any, angle: float) -> None:
 
 @kernel
 def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effects: bool) -> None:
-    """Turn commands into the shafts' free speeds."""
-    s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
+    """Turn commands into the shafts' free speeds, at the step's voltage."""
     if effects:
         if p.regulated != 0.0:
             left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)

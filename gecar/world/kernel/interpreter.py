@@ -12,6 +12,7 @@ from gecar.compiled import kernel
 from gecar.language.opcodes import EQUAL, JUMP, MOTOR_UNTIL, TEST
 from gecar.random_streams import LARGEST_NORMAL, normal, skip_normal
 from gecar.world.kernel.sensing import RING, delayed, glance, lag_keep, lagged, reported
+from gecar.world.kernel.terms import colour_error
 
 # Where the program stands. `due_ms` is the schedule the program asks for; steps round it, but never add up errors.
 CONTROL = np.dtype(
@@ -95,8 +96,15 @@ def look(n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> None:
 def reflection(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> float:
     """Return the reflection [%] that a sensor reports on at step ``n``: lagged and late, without noise."""
     if p.sensor_lag == 0.0 and p.sensor_delay == 0.0:
-        return see(sensor, s, p, floor)
-    return delayed(eyes.rings, sensor * RING, n, p.sensor_delay / dt)
+        level = see(sensor, s, p, floor)
+    else:
+        level = delayed(eyes.rings, sensor * RING, n, p.sensor_delay / dt)
+    if p.n_terms > 0.0:  # what they add, they add to the reading
+        x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
+        level += (
+            colour_error(s.t, x, y, s.heading, p.sensor_gain * level + p.sensor_offset, p) / p.sensor_gain
+        )
+    return level
 
 
 @kernel

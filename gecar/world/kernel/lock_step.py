@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import kernel, lane_access
+from gecar.compiled import kernel, lane_access, numbers
 from gecar.world.effects import PHYSICS
 from gecar.world.kernel.contacts import sweep
 from gecar.world.kernel.dynamics import begin_step, drift, end_step
@@ -25,7 +25,7 @@ ACTING = np.dtype([(field, np.float64) for field in ("left", "right", "settled")
 """The commands that act in a step, after cap and delay, and whether its contacts are settled."""
 
 _P = len(STATE.descr)
-_C = _P + len(PHYSICS.descr)
+_C = _P + len(numbers(PHYSICS))
 _A = _C + len(DERIVED.descr)
 N_FIELDS = _A + len(ACTING.descr)
 """Fields of a lane; others may follow."""

@@ -70,10 +70,22 @@ def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, ef
 
 
 @kernel
-def bare_shaft(duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any) -> float:
-    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air."""
-    driven = conduct(duty, voltage, angle, speed, p, c)
-    budget = friction_budget(driven, 0.0, 0.0, p, c) * c.inv_rotor
+def bare_shaft(
+    duty: float,
+    voltage: float,
+    angle: float,
+    speed: float,
+    p: Any,
+    c: Any,
+    torque: float = 0.0,
+    friction: float = 0.0,
+) -> float:
+    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air.
+
+    Beside the motor's own, a torque and a friction [N m] may act on it.
+    """
+    driven = conduct(duty, voltage, angle, speed, p, c) + torque * c.dt * c.inv_rotor
+    budget = max(friction_budget(driven, 0.0, 0.0, p, c) + friction * c.dt, 0.0) * c.inv_rotor
     return driven - min(max(driven, -budget), budget)
 
 
@@ -125,6 +137,22 @@ def bench_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> N
         Records of dtypes `PHYSICS` and `DERIVED`.
     """
     s.voltage = supply(s, p)
+    turn_bare_shafts(s, left_duty, right_duty, 0.0, 0.0, 0.0, 0.0, p, c)
+
+
+@kernel
+def turn_bare_shafts(
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    left_torque: float,
+    right_torque: float,
+    left_friction: float,
+    right_friction: float,
+    p: Any,
+    c: Any,
+) -> None:
+    """Advance both shafts by one step at the step's voltage; see `bare_shaft` for torques and frictions."""
     if p.regulated != 0.0:
         left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
@@ -132,8 +160,13 @@ def bench_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> N
     s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
     s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
     s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
-    s.left_speed = bare_shaft(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c)
-    s.right_speed = bare_shaft(s.right_drive, s.voltage, s.right_angle + p.ripple_lead, s.right_speed, p, c)
+    right_angle = s.right_angle + p.ripple_lead
+    s.left_speed = bare_shaft(
+        s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, left_torque, left_friction
+    )
+    s.right_speed = bare_shaft(
+        s.right_drive, s.voltage, right_angle, s.right_speed, p, c, right_torque, right_friction
+    )
     s.left_angle += s.left_speed * c.dt
     s.right_angle += s.right_speed * c.dt
     left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)

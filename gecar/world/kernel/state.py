@@ -57,8 +57,6 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.half_track = 0.5 * p.track_width * p.track_scale
     c.axle = -p.com_ahead
     c.caster = p.caster_ahead - p.com_ahead
-    c.left_radius = p.wheel_radius * p.radius_scale * (1.0 - 0.5 * p.radius_difference)
-    c.right_radius = p.wheel_radius * p.radius_scale * (1.0 + 0.5 * p.radius_difference)
     _rotor(p, dt, c)
     c.left_gain = 1.0 - 0.5 * p.gain_difference
     c.right_gain = 1.0 + 0.5 * p.gain_difference
@@ -72,6 +70,17 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.tilt_y = GRAVITY * math.sin(p.tilt_y) * dt
     c.sliding = p.coulomb_friction * dt
     c.ripple = p.ripple_amplitude * dt / c.rotor
+    roll_on(p, 0.0, 0.0, c)
+
+
+@kernel
+def roll_on(p: Any, left_share: float, right_share: float, c: Any) -> None:
+    """Let the wheels roll on radii that are larger by these shares."""
+    c.left_radius = p.wheel_radius * p.radius_scale * (1.0 - 0.5 * p.radius_difference)
+    c.right_radius = p.wheel_radius * p.radius_scale * (1.0 + 0.5 * p.radius_difference)
+    if left_share != 0.0 or right_share != 0.0:
+        c.left_radius *= max(1.0 + left_share, 0.1)
+        c.right_radius *= max(1.0 + right_share, 0.1)
     _contact_masses(c)
 
 

@@ -1,0 +1,342 @@
+"""Terms: missing physics written as laws, a part of the robot like any constant.
+
+A robot file holds them as ``[[term]]`` tables::
+
+    [[term]]
+    port = "motor_torque"                   # where it acts: gecar.world.ports.PORTS
+    law = "-a * speed * abs(speed)"         # variables: gecar.world.ports.VARIABLES
+    a = 1.2e-5                              # the law's constants
+    unit = "N m"                            # the port's; optional, checked
+
+    [[term]]
+    port = "motor_torque"
+    side = "left"                           # of that wheel alone; or "right"; default "both"
+    law = "-a * store * command"
+    store = "square(command)"               # d store / dt = (square(command) - store) / store_s
+    store_s = 12.0
+    a = 0.05
+
+A law is read by Python's own parser and turned into postfix tokens; it is never run as Python. ``at_x`` and ``at_y``
+are the point that ``force_toward`` pulls to, and that ``distance`` is measured from.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from gecar.world.ports import (
+    AT_X,
+    AT_Y,
+    BY_PORT,
+    CONSTANTS,
+    FIRST_OPERATOR,
+    FIRST_VARIABLE,
+    FUNCTIONS,
+    LAW,
+    LENGTH,
+    MOST_CONSTANTS,
+    MOST_STORE_TOKENS,
+    MOST_TOKENS,
+    N_TERMS,
+    OF_TWO,
+    OPERATOR,
+    PORT,
+    PORT_NUMBER,
+    SIDE,
+    SIDES,
+    STACK,
+    STORE_LAW,
+    STORE_LENGTH,
+    STORE_S,
+    TERM_WIDTH,
+    VARIABLE,
+    Port,
+)
+
+MOST_CHARACTERS = 300
+POINT = ("at_x", "at_y")
+_MARKS: Mapping[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law as tokens.
+
+    Attributes
+    ----------
+    tokens
+        Constants' numbers, variables and operators, postfix.
+    variables
+        Those it looks at, in the order they are met.
+    """
+
+    tokens: tuple[int, ...]
+    variables: tuple[str, ...]
+
+
+def parse_law(text: str, port: Port, constants: Sequence[str], most: int, names: Sequence[str] = ()) -> Law:
+    """Read a law.
+
+    Parameters
+    ----------
+    text
+        As in a robot file.
+    port
+        Where it acts.
+    constants
+        Names of its constants, in their order.
+    most
+        Tokens there is room for.
+    names
+        Variables beside the port's own.
+
+    Raises
+    ------
+    ValueError
+        Where it is none: says what was found and what was expected.
+    """
+    if len(text) > MOST_CHARACTERS:
+        raise ValueError(f"found a law of {len(text)} characters, expected at most {MOST_CHARACTERS}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"found law '{text}', expected a formula as -a * speed * abs(speed)") from None
+    allowed = (*port.variables, *names)
+    tokens = list(_postfix(tree, constants, allowed, port))
+    if len(tokens) > most:
+        raise ValueError(f"found a law of {len(tokens)} steps, expected at most {most}")
+    if _deepest(tokens) > STACK:
+        raise ValueError(
+            f"found law '{text}', which holds more than {STACK} values at once: expected a shallower one"
+        )
+    looked_at = [k - FIRST_VARIABLE for k in tokens if FIRST_VARIABLE <= k < FIRST_OPERATOR]
+    by_number = {number: name for name, number in VARIABLE.items()}
+    return Law(tuple(tokens), tuple(dict.fromkeys(by_number[k] for k in looked_at)))
+
+
+def _postfix(node: ast.AST, constants: Sequence[str], allowed: Sequence[str], port: Port) -> Iterator[int]:
+    """Yield a formula's tokens."""
+    match node:
+        case ast.BinOp(left, operator, right) if type(operator) in _MARKS:
+            yield from _postfix(left, constants, allowed, port)
+            yield from _postfix(right, constants, allowed, port)
+            yield OPERATOR[_MARKS[type(operator)]]
+        case ast.BinOp(base, ast.Pow(), ast.Constant(2)):
+            yield from _postfix(base, constants, allowed, port)
+            yield OPERATOR["square"]
+        case ast.UnaryOp(ast.USub(), inner):
+            yield from _postfix(inner, constants, allowed, port)
+            yield OPERATOR["negative"]
+        case ast.UnaryOp(ast.UAdd(), inner):
+            yield from _postfix(inner, constants, allowed, port)
+        case ast.Call(ast.Name(name), arguments, []) if name in FUNCTIONS:
+            wanted = 2 if OPERATOR[name] < FIRST_OPERATOR + OF_TWO else 1
+            if len(arguments) != wanted:
+                raise ValueError(f"found {name} of {len(arguments)} values, expected {wanted}")
+            for argument in arguments:
+                yield from _postfix(argument, constants, allowed, port)
+            yield OPERATOR[name]
+        case ast.Name(name) if name in constants:
+            yield list(constants).index(name)
+        case ast.Name(name) if name in allowed:
+            yield FIRST_VARIABLE + VARIABLE[name]
+        case _:
+            raise _no_law(node, constants, allowed, port)
+
+
+def _no_law(node: ast.AST, constants: Sequence[str], allowed: Sequence[str], port: Port) -> ValueError:
+    if isinstance(node, ast.Name):
+        given = ", ".join(constants) or "none"
+        return ValueError(
+            f"found '{node.id}', expected a constant given beside the law ({given}) "
+            f"or a variable of {port.id}: {', '.join(allowed)}"
+        )
+    found = ast.unparse(node) if isinstance(node, ast.expr) else type(node).__name__
+    return ValueError(
+        f"found '{found}', expected numbers, variables, + - * / ** 2 and {', '.join(FUNCTIONS)}"
+    )
+
+
+def _deepest(tokens: Sequence[int]) -> int:
+    """Return how many values a law holds at most at once."""
+    held = most = 0
+    for token in tokens:
+        held += 1 if token < FIRST_OPERATOR else -1 if token < FIRST_OPERATOR + OF_TWO else 0
+        most = max(most, held)
+    return most
+
+
+class Term(BaseModel):
+    """A law at a port.
+
+    Attributes
+    ----------
+    port
+        Where it acts.
+    law
+        What it gives there, in the port's unit.
+    side
+        Of which wheel; ``both`` where the port has two.
+    store, store_s
+        The law of what its store fills toward, and the store's time constant [s]; "": it has none.
+    unit
+        The port's; checked where it is given.
+
+    What else is given is a constant of the law, by name.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    port: str
+    law: str
+    side: Literal["both", "left", "right"] = "both"
+    store: str = ""
+    store_s: float = 1.0
+    unit: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_numbers_named(cls, data: Any) -> Any:
+        """Give the numbers written in a law names, so that all its constants are constants."""
+        if not isinstance(data, Mapping) or not isinstance(data.get("law"), str):
+            return data
+        table = dict(data)
+        for field in ("law", "store"):
+            if isinstance(table.get(field), str) and len(table[field]) <= MOST_CHARACTERS:
+                table[field], found = _named(table[field], table)
+                table |= found
+        if not table.get("unit") and table.get("port") in BY_PORT:
+            table["unit"] = BY_PORT[table["port"]].unit
+        return table
+
+    @model_validator(mode="after")
+    def _is_a_law(self) -> Term:
+        if self.port not in BY_PORT:
+            raise ValueError(f"found port '{self.port}', expected one of {', '.join(BY_PORT)}")
+        port = BY_PORT[self.port]
+        if self.unit != port.unit:
+            raise ValueError(f"found unit '{self.unit}', expected that of {port.id}: {port.unit}")
+        if self.side != "both" and not port.of_wheel:
+            raise ValueError(f"found side '{self.side}', but {port.id} has no sides")
+        self._check_constants()
+        self._check_store(port)
+        self.row  # noqa: B018 - a fault in a law is the file's
+        return self
+
+    def _check_constants(self) -> None:
+        for name, value in self.constants.items():
+            if name in VARIABLE or name in FUNCTIONS or not name.isidentifier() or keyword.iskeyword(name):
+                raise ValueError(f"found constant '{name}', expected a name that is no variable or function")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise ValueError(f"found {name} = {value!r}, expected a finite number")
+        if len(self.free) > MOST_CONSTANTS:
+            raise ValueError(f"found {len(self.free)} constants, expected at most {MOST_CONSTANTS}")
+        if self.port == "force_toward" and set(POINT) - set(self.constants):
+            raise ValueError("found force_toward without at_x and at_y, expected both [m]")
+
+    def _check_store(self, port: Port) -> None:
+        if self.store and port.reads:
+            raise ValueError(f"found a store at {port.id}, expected none at a sensor's port")
+        if not 1e-3 <= self.store_s <= 1e4:
+            raise ValueError(f"found store_s = {self.store_s:g}, expected 0.001 to 10000 s")
+        if "store" in self.parsed.variables and not self.store:
+            raise ValueError("found a law of 'store' without one, expected store = \"...\" and store_s")
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """Constants by name, the point on the floor included."""
+        return dict(self.model_extra or {})
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the law's constants, in their order."""
+        return tuple(name for name in self.constants if name not in POINT)
+
+    @property
+    def parsed(self) -> Law:
+        """The law as tokens."""
+        return parse_law(self.law, BY_PORT[self.port], self.free, MOST_TOKENS)
+
+    @property
+    def _store_law(self) -> Law:
+        return (
+            parse_law(self.store, BY_PORT[self.port], self.free, MOST_STORE_TOKENS)
+            if self.store
+            else Law((), ())
+        )
+
+    @property
+    def row(self) -> npt.NDArray[np.float64]:
+        """The term as the kernels take it, shape (TERM_WIDTH,); see `gecar.world.ports`."""
+        row = np.zeros(TERM_WIDTH)
+        law, store = self.parsed.tokens, self._store_law.tokens
+        row[[PORT, SIDE, LENGTH, STORE_LENGTH]] = (
+            PORT_NUMBER[self.port],
+            SIDES[self.side],
+            len(law),
+            len(store),
+        )
+        row[STORE_S] = self.store_s
+        row[AT_X], row[AT_Y] = (self.constants.get(name, 0.0) for name in POINT)
+        for number, name in enumerate(self.free):
+            row[CONSTANTS + number] = self.constants[name]
+        row[LAW : LAW + len(law)] = law
+        row[STORE_LAW : STORE_LAW + len(store)] = store
+        return row
+
+    def with_constants(self, values: Mapping[str, float]) -> Term:
+        """Return the term with other constants; ``store_s`` among them."""
+        return Term(**{**self.as_table(), **values})
+
+    def as_table(self) -> dict[str, Any]:
+        """Return the term as a table of a robot file."""
+        table: dict[str, Any] = {"port": self.port, "law": self.law}
+        if self.side != "both":
+            table["side"] = self.side
+        if self.store:
+            table |= {"store": self.store, "store_s": self.store_s}
+        return {**table, **self.constants, "unit": self.unit}
+
+
+def rows_of(terms: Sequence[Term]) -> npt.NDArray[np.float64]:
+    """Return terms as the kernels take them, shape (N_TERMS, TERM_WIDTH)."""
+    rows = np.zeros((N_TERMS, TERM_WIDTH))
+    for k, term in enumerate(terms):
+        rows[k] = term.row
+    return rows
+
+
+def _named(law: str, taken: Mapping[str, Any]) -> tuple[str, dict[str, float]]:
+    """Return a law with names in the place of the numbers written in it, and those numbers by name."""
+    try:
+        tree = ast.parse(law.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return law, {}
+    found: dict[str, float] = {}
+    free = (f"k{n}" for n in range(1, 100) if f"k{n}" not in taken)
+
+    class Name(ast.NodeTransformer):
+        def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+            if isinstance(node.op, ast.Pow):
+                node.left = self.visit(node.left)
+                return node
+            return self.generic_visit(node)
+
+        def visit_Constant(self, node: ast.Constant) -> ast.AST:
+            if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+                return node
+            name = next(free)
+            found[name] = float(node.value)
+            return ast.Name(name, ast.Load())
+
+    changed = Name().visit(tree)
+    return (ast.unparse(changed), found) if found else (law, {})
