@@ -163,6 +163,7 @@ FORMULAS = [
     ("sqrt(speed) * sign(-speed)", lambda a, b, v: math.sqrt(abs(v)) * np.sign(-v)),
     ("tanh(a * speed) + positive(speed) + sin(speed) - cos(b * speed)",
      lambda a, b, v: math.tanh(a * v) + (v > 0) + math.sin(v) - math.cos(b * v)),
+    ("ramp(abs(speed) - b)", lambda a, b, v: max(abs(v) - b, 0.0)),
     ("a - (b - (a - (b - (a - speed))))", lambda a, b, v: a - (b - (a - (b - (a - v))))),
 ]  # fmt: skip
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import notes_on
@@ -22,6 +23,7 @@ from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
+from gecar.reality.invent.invention import invent
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
@@ -43,11 +45,22 @@ from gecar.reality.selection.stepwise import Explanation, explain
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
-from gecar.reality.verdict import Found, Interval, Judgement, Limit, Minor, Misfit, Residual, Verdict
+from gecar.reality.verdict import (
+    Found,
+    Interval,
+    Invented,
+    Judgement,
+    Limit,
+    Minor,
+    Misfit,
+    Residual,
+    Verdict,
+)
 from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE, Effect
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Outcome, World, simulate
+from gecar.world.terms import Term
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 
@@ -64,6 +77,8 @@ class _Context:
     with_formula: bool
     material: Material
     program: Program | None
+    language: Grammar | None
+    invents: bool
 
     def arrival_apart_s(self, one: Robot, other: Robot) -> float | None:
         """Return how much later or earlier one robot arrives with the program than another [s]; None: unknown."""
@@ -87,6 +102,8 @@ def discover(
     catalogue: Sequence[Effect] = CATALOGUE,
     material: Material = DEFAULT,
     program: Program | None = None,
+    language: Grammar | None = None,
+    invents: bool = False,
 ) -> Verdict:
     """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
 
@@ -112,6 +129,10 @@ def discover(
         From what size on something is material.
     program
         Whose time of arrival tells sizes, too.
+    language
+        The language of laws that are written where nothing in the catalogue explains what is left; default: none are.
+    invents
+        Whether laws are written in any case.
 
     Raises
     ------
@@ -120,7 +141,16 @@ def discover(
     """
     known = robot if robot is not None else load_robot(case.recordings[0].setup.robot)
     context = _Context(
-        known, tuple(catalogue), hold_out(case, holdout), seed, tell, with_formula, material, program
+        known,
+        tuple(catalogue),
+        hold_out(case, holdout),
+        seed,
+        tell,
+        with_formula,
+        material,
+        program,
+        language,
+        invents,
     )
     with Threads(workers) as threads:
         return _discover(case.name, context, threads)
@@ -132,26 +162,29 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
     fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
-    motion = _explain_motion(context, fitted, held)
+    motion = _with_laws(context, _explain_motion(context, fitted, held), held)
     fitted = _along_paths(
         motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
     )
     sensing = _explain_sensor(context, motion.explained, fitted, held)
     stages = [stage for stage in (motion, sensing) if stage]
     found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
+    found = found.with_terms([*known.term, *(term for stage in stages for term in stage.laws)])
     before, after = (
         Contender(robot, _with_nuisances(held, motion.explained, robot.physics)) for robot in (known, found)
     )
     context.tell("alternatives, location")
     effects, rivals = _findings(context, stages)
     unexplained = any(stage.explained.unexplained for stage in stages)
-    word = _word(bool(effects), unexplained)
+    invented = tuple(law for stage in stages for law in stage.invented)
+    word = _word(bool(effects), bool(invented), unexplained)
     where = _located(context, stages, fitted, found)
     return Verdict(
         case=name,
         verdict=word,
         effects=effects,
         minor=tuple(_minor(context, stage, step) for stage in stages for step in stage.explained.minor),
+        invented=invented,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
         residual=_what_is_left(context, stages, fitted, after),
@@ -180,9 +213,19 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
 
 @dataclass(frozen=True)
 class _Stage(Confirmation):
-    """What was explained and confirmed, with the 95 % intervals of its parameters by effect and label."""
+    """What was explained and confirmed, and laws written on top of it.
+
+    Attributes
+    ----------
+    spans
+        95 % intervals of the effects' parameters, by effect and label.
+    laws, invented
+        The laws, and what the verdict says of them.
+    """
 
     spans: Mapping[str, Mapping[str, Interval]]
+    laws: tuple[Term, ...] = ()
+    invented: tuple[Invented, ...] = ()
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
@@ -204,12 +247,22 @@ def _explain_sensor(
     if not residuals.recordings:
         return None
     # A late camera and a skewed clock shift what is read, too.
-    known = context.robot.with_effects(motion.taken.values)
+    known = motion.taken.parameters.robot.with_effects(motion.taken.values)
     catalogue = observable(context.catalogue, residuals)
     problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell)
-    seen = confirmed(explain(problem), _with_nuisances(held, motion, motion.taken.physics).of_sensor())
+    beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
+    seen = confirmed(explain(problem), beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
-    return _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
+    stage = _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
+    return _with_laws(context, stage, beside)
+
+
+def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:
+    """Return a stage with laws written for what its effects leave, where that is asked for."""
+    if context.language is None or not (stage.explained.unexplained or context.invents):
+        return stage
+    written = invent(stage.explained, held, context.language, context.seed, context.tell)
+    return replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
 
 
 def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
@@ -329,7 +382,9 @@ def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, M
     return {column: m for column, m in misfits.items() if m.before != m.after}
 
 
-def _word(named: bool, unexplained: bool) -> str:
+def _word(named: bool, invented: bool, unexplained: bool) -> str:
+    if invented:
+        return "missing_and_invented" if named else "invented"
     if named:
         return "missing_and_unexplained" if unexplained else "missing"
     return "unexplained" if unexplained else "nothing"

@@ -9,6 +9,7 @@ from typing import Any
 
 from gecar.reality.materiality import Size
 from gecar.world.robot import Robot
+from gecar.world.terms import Term
 
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
@@ -71,6 +72,45 @@ class Found:
     holdout_gain: float
     null_95: float
     p: float
+    size: Size
+
+
+@dataclass(frozen=True)
+class Invented:
+    """A law that was written for physics in no list.
+
+    Attributes
+    ----------
+    term
+        The law, as a part of the robot.
+    alternatives
+        Laws at other ports that these recordings can not tell from it.
+    parameters
+        Its constants, by name.
+    looks_like
+        In words.
+    holdout_gain, left_out_gain
+        What it lowers the cost by on the recordings set aside, and on those fitted to, each left out in turn.
+    null_95, p
+        95 % quantile of the largest gain of any law that was tried, without a cause; share of nulls that gain as much.
+    spread
+        Relative spread of its size over recordings.
+    range
+        From where to where its variables went in the recordings; beyond, the law is a guess.
+    size
+        What it does to the robot.
+    """
+
+    term: Term
+    alternatives: tuple[Term, ...]
+    parameters: Mapping[str, Interval]
+    looks_like: str
+    holdout_gain: float
+    left_out_gain: float
+    null_95: float
+    p: float
+    spread: float
+    range: Mapping[str, tuple[float, float]]
     size: Size
 
 
@@ -215,10 +255,16 @@ class Verdict:
     next_recording: NextRecording
     robot: Robot
     minor: tuple[Minor, ...] = ()
+    invented: tuple[Invented, ...] = ()
     limits: Mapping[str, Limit | None] = field(default_factory=dict)
     fitted_on: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     evidence: Any = field(default=None, repr=False)
+
+    @property
+    def found(self) -> bool:
+        """Whether anything was found: effects, or laws that were written."""
+        return bool(self.effects or self.invented)
 
     def as_json(self) -> dict[str, Any]:
         """Return the contents of ``verdict.json``."""
@@ -227,6 +273,7 @@ class Verdict:
             "verdict": self.verdict,
             "effects": [_effect_json(found) for found in self.effects],
             "minor": [_minor_json(minor) for minor in self.minor],
+            "invented": [_invented_json(law) for law in self.invented],
             "located": [_place_json(place) for place in self.located],
             "holdout": {
                 "recordings": list(judged.recordings),
@@ -251,6 +298,30 @@ def _effect_json(found: Found) -> dict[str, Any]:
         "or": list(found.alternatives),
         "parameters": {label: vars(interval) for label, interval in found.parameters.items()},
         "evidence": {"holdout_gain": found.holdout_gain, "null_95": found.null_95, "p": found.p},
+    }
+
+
+def _invented_json(law: Invented) -> dict[str, Any]:
+    term = law.term
+    return {
+        "port": term.port,
+        "side": term.side,
+        "law": term.law,
+        "store": {"law": term.store, "time_s": term.store_s} if term.store else None,
+        "unit": term.unit,
+        "variables": list(term.parsed.variables),
+        "parameters": {name: vars(interval) for name, interval in law.parameters.items()},
+        "looks_like": law.looks_like,
+        "or": [{"port": other.port, "law": other.law, **other.constants} for other in law.alternatives],
+        "evidence": {
+            "holdout_gain": law.holdout_gain,
+            "left_out_gain": law.left_out_gain,
+            "null_95": law.null_95,
+            "p": law.p,
+            "spread": law.spread,
+        },
+        "range": {name: list(ends) for name, ends in law.range.items()},
+        "moves": size_json(law.size),
     }
 
 

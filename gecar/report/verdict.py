@@ -7,6 +7,7 @@ import math
 from gecar.reality.materiality import Size
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.verdict import VISIBLE, Found, Interval, Limit, Minor, Misfit, Place, Verdict
+from gecar.report.law import law_sentence
 from gecar.report.units import amount, quantities, smallest
 from gecar.world.effects import BY_ID
 
@@ -30,17 +31,18 @@ def words(verdict: Verdict) -> list[str]:
 def sentences(verdict: Verdict) -> list[str]:
     """Say a verdict, a sentence or two a paragraph; a proof that failed comes first."""
     out = [title(verdict)]
-    if verdict.effects:
+    if verdict.found:
         out.append(failure(verdict) if verdict.judgement.failed else _proof(verdict))
     out += [_effect(found, verdict) for found in verdict.effects]
+    out += [law_sentence(law) for law in verdict.invented]
     if verdict.minor:
         named = "; ".join(
             f"{BY_ID[m.id].title} ({m.id}), which {does(m.size, verdict)}" for m in verdict.minor
         )
         out.append(f"Visible, and too small to matter; it could be: {named}.")
-    if verdict.verdict == "missing" and not verdict.judgement.failed:
+    if verdict.found and not verdict.residual.material and not verdict.judgement.failed:
         out.append(f"What is left {does(verdict.residual.size, verdict)}, which does not matter.")
-    if verdict.verdict.endswith("unexplained"):
+    if verdict.residual.material:
         out.append(unexplained(verdict))
     if verdict.located:
         out.append(
@@ -86,10 +88,12 @@ def _names(verdict: Verdict) -> str:
 
 
 def _headline(verdict: Verdict) -> str:
-    names = _names(verdict)
+    names, laws = _names(verdict), " and ".join(law.looks_like for law in verdict.invented)
     return {
         "nothing": _nothing(verdict),
         "missing": f"Missing in the simulation: {names}.",
+        "invented": f"Missing in the simulation, and in no list: {laws}.",
+        "missing_and_invented": f"Missing in the simulation: {names}; and, in no list, {laws}.",
         "unexplained": "Something is missing, and nothing in the catalogue explains it.",
         "missing_and_unexplained": (
             f"Missing in the simulation: {names}; and something that nothing in the catalogue explains."
@@ -226,7 +230,7 @@ def in_units(column: str, misfit: Misfit) -> tuple[str, str, str]:
 def unexplained(verdict: Verdict) -> str:
     """Say what is left that nothing explains."""
     shown = verdict.located[0] if verdict.located else None
-    words = f"No effect in the catalogue explains what is left: it {does(verdict.residual.size, verdict)}."
+    words = f"Nothing explains what is left: it {does(verdict.residual.size, verdict)}."
     if shown is not None:
         words += f" It shows most in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
     if verdict.residual.formula:

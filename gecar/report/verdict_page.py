@@ -57,7 +57,7 @@ text-align:left;border-bottom:1px solid #D8DEE4;vertical-align:top;overflow-wrap
 """
 _CAPTIONS = {
     "gap": "The gap on recordings set aside", "where": "In what motion", "traces": "Measured, before and after",
-    "map": "At what place", "tried": "What was tried, and what it leaves",
+    "map": "At what place", "tried": "What was tried, and what it leaves", "law": "The law that was written",
 }  # fmt: skip
 NO_TABLES: Mapping[str, str] = MappingProxyType({})
 _KINDS = {PLACE: "", WHEELS: " of a wheel's turn", READING: " of a reading"}

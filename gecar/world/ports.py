@@ -72,6 +72,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable("distance", "m", "the distance to a point on the floor", 1.0),
     Variable("reading", "%", "the colour sensor's reading", 50.0),
     Variable("store", "-", "the term's own store", 1.0, True),
+    Variable("draw", "A", "the current both motors draw", 0.5),
 )  # fmt: skip
 VARIABLE = {variable.id: number for number, variable in enumerate(VARIABLES)}
 
@@ -95,8 +96,11 @@ class Port:
         What is much there, in that unit: searches begin with a hundredth of it.
     variables
         What laws there may look at.
-    reads
-        Whether it is a sensor's: what is measured changes, not what the robot does.
+    sensor
+        Whose it is, where what is measured changes and not what the robot does: ``encoders``, ``gyro``, ``camera`` or
+        ``colour``; "": the robot's own.
+    on_bench
+        Whether it acts on a motor whose wheel hangs in the air.
     """
 
     id: str
@@ -105,14 +109,20 @@ class Port:
     of_wheel: bool
     worth: float
     variables: tuple[str, ...] = _MOVING
-    reads: bool = False
+    sensor: str = ""
+    on_bench: bool = False
+
+    @property
+    def reads(self) -> bool:
+        """Whether it is a sensor's."""
+        return bool(self.sensor)
 
 
 PORTS: tuple[Port, ...] = (
-    Port("command", "-", "a change of the duty", True, 0.2),
-    Port("supply_voltage", "V", "a change of the battery's voltage", False, 1.0),
-    Port("motor_torque", "N m", "a torque on the motor's shaft", True, 0.1),
-    Port("gear_friction", "N m", "dry friction in the gears", True, 0.05),
+    Port("command", "-", "a change of the duty", True, 0.2, on_bench=True),
+    Port("supply_voltage", "V", "a change of the battery's voltage", False, 1.0, on_bench=True),
+    Port("motor_torque", "N m", "a torque on the motor's shaft", True, 0.1, on_bench=True),
+    Port("gear_friction", "N m", "dry friction in the gears", True, 0.05, on_bench=True),
     Port("rolling_radius", "-", "a share of the wheel's rolling radius", True, 0.1),
     Port("wheel_load", "N", "a load on the wheel", True, 2.0),
     Port("tyre_grip", "-", "a share of the tyre's grip", True, 0.5),
@@ -122,13 +132,14 @@ PORTS: tuple[Port, ...] = (
     Port("force_y", "N", "a force along y", False, 1.0),
     Port("force_toward", "N", "a pull toward a point on the floor", False, 1.0, (*_MOVING, "distance")),
     Port("yaw_moment", "N m", "a turning moment on the body", False, 0.1),
-    Port("encoder_reading", "rad", "an error of the encoder", True, 0.1, ("time", "angle", "speed", "side"), True),
-    Port("gyro_reading", "rad/s", "an error of the gyro", False, 0.2, _SEEN, True),
-    Port("pose_x", "m", "an error of the camera along x", False, 0.05, _SEEN, True),
-    Port("pose_y", "m", "an error of the camera along y", False, 0.05, _SEEN, True),
-    Port("pose_heading", "rad", "an error of the camera's heading", False, 0.05, _SEEN, True),
+    Port("encoder_reading", "rad", "an error of the encoder", True, 0.1, ("time", "angle", "speed", "side"),
+         "encoders", True),
+    Port("gyro_reading", "rad/s", "an error of the gyro", False, 0.2, _SEEN, "gyro"),
+    Port("pose_x", "m", "an error of the camera along x", False, 0.05, _SEEN, "camera"),
+    Port("pose_y", "m", "an error of the camera along y", False, 0.05, _SEEN, "camera"),
+    Port("pose_heading", "rad", "an error of the camera's heading", False, 0.05, _SEEN, "camera"),
     Port("colour_reading", "%", "an error of the colour sensor", False, 10.0,
-         ("time", "x", "y", "heading", "reading"), True),
+         ("time", "x", "y", "heading", "reading"), "colour"),
 )  # fmt: skip
 PORT_NUMBER = {port.id: number for number, port in enumerate(PORTS)}
 BY_PORT = {port.id: port for port in PORTS}
@@ -138,9 +149,9 @@ FIRST_VARIABLE = 50
 FIRST_OPERATOR = 100
 OPERATORS = (
     "+", "-", "*", "/", "min", "max",
-    "negative", "abs", "sign", "square", "sqrt", "exp", "sin", "cos", "tanh", "positive",
+    "negative", "abs", "sign", "square", "sqrt", "exp", "sin", "cos", "tanh", "positive", "ramp",
 )  # fmt: skip
-"""Those of two values, then those of one; ``positive`` is 1 above 0 and else 0."""
+"""Those of two values, then those of one; above 0 ``positive`` is 1 and ``ramp`` the value itself, else both are 0."""
 OF_TWO = 6
 OPERATOR = {name: FIRST_OPERATOR + number for number, name in enumerate(OPERATORS)}
-FUNCTIONS = ("min", "max", "abs", "sign", "square", "sqrt", "exp", "sin", "cos", "tanh", "positive")
+FUNCTIONS = ("min", "max", "abs", "sign", "square", "sqrt", "exp", "sin", "cos", "tanh", "positive", "ramp")

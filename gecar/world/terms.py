@@ -25,6 +25,7 @@ from __future__ import annotations
 import ast
 import keyword
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -49,6 +50,7 @@ from gecar.world.ports import (
     N_TERMS,
     OF_TWO,
     OPERATOR,
+    OPERATORS,
     PORT,
     PORT_NUMBER,
     SIDE,
@@ -65,6 +67,15 @@ from gecar.world.ports import (
 MOST_CHARACTERS = 300
 POINT = ("at_x", "at_y")
 _MARKS: Mapping[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+
+
+_WORKED_OUT: Mapping[str, Any] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "min": np.minimum, "max": np.maximum,
+    "/": lambda a, b: a / np.where(np.abs(b) > 1e-9, b, np.copysign(1e-9, b)),
+    "negative": np.negative, "abs": np.abs, "sign": np.sign, "square": np.square, "sqrt": lambda a: np.sqrt(np.abs(a)),
+    "exp": lambda a: np.exp(np.minimum(a, 50.0)), "sin": np.sin, "cos": np.cos, "tanh": np.tanh,
+    "positive": lambda a: np.where(a > 0.0, 1.0, 0.0), "ramp": lambda a: np.maximum(a, 0.0),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -293,6 +304,38 @@ class Term(BaseModel):
         row[STORE_LAW : STORE_LAW + len(store)] = store
         return row
 
+    def value(self, variables: Mapping[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+        """Return what the law gives where variables have some values, all of one shape, as the kernels do."""
+        names, stack = list(VARIABLE), list[Any]()
+        with np.errstate(all="ignore"):
+            for token in self.parsed.tokens:
+                if token < FIRST_VARIABLE:
+                    stack.append(np.asarray(self.constants[self.free[token]], float))
+                elif token < FIRST_OPERATOR:
+                    stack.append(np.asarray(variables[names[token - FIRST_VARIABLE]], float))
+                else:
+                    operator = OPERATORS[token - FIRST_OPERATOR]
+                    taken = [stack.pop() for _ in range(2 if token < FIRST_OPERATOR + OF_TWO else 1)][::-1]
+                    stack.append(np.clip(np.nan_to_num(_WORKED_OUT[operator](*taken)), -1e6, 1e6))
+        return np.asarray(stack.pop() + 0.0 * next(iter(variables.values())), float)
+
+    @property
+    def typeset(self) -> str:
+        """The term as a formula with its numbers: ``motor_torque = -0.00012 speed |speed| [N m]``."""
+        formula = self.law
+        for name, value in self.constants.items():
+            formula = re.sub(rf"\b{name}\b", f"{value:.3g}", formula)
+        side = "" if self.side == "both" else f" ({self.side} wheel)"
+        unit = "" if self.unit == "-" else f" [{self.unit}]"
+        words = f"{self.port}{side} = {_pretty(formula)}{unit}"
+        if self.store:
+            words += (
+                f", where store follows {_pretty(self.store)} with a time constant of {self.store_s:.3g} s"
+            )
+        if "at_x" in self.constants:
+            words += f", from ({self.constants['at_x']:.2f}, {self.constants['at_y']:.2f}) m"
+        return words
+
     def with_constants(self, values: Mapping[str, float]) -> Term:
         """Return the term with other constants; ``store_s`` among them."""
         return Term(**{**self.as_table(), **values})
@@ -313,6 +356,13 @@ def rows_of(terms: Sequence[Term]) -> npt.NDArray[np.float64]:
     for k, term in enumerate(terms):
         rows[k] = term.row
     return rows
+
+
+def _pretty(formula: str) -> str:
+    """Return a formula as it would be printed."""
+    formula = re.sub(r"abs\(([^()]+)\)", r"|\1|", formula)
+    formula = re.sub(r"square\((\w+)\)", r"\1²", formula).replace(" ** 2", "²")
+    return formula.replace(" * ", " ").replace("- -", "+ ").replace("+ -", "- ")
 
 
 def _named(law: str, taken: Mapping[str, Any]) -> tuple[str, dict[str, float]]:

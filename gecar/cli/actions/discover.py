@@ -16,6 +16,7 @@ import typer
 from gecar.cli.output import Output
 from gecar.errors import InputError
 from gecar.files import json_ready, json_text, write_whole
+from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.parallel.run_parallel import Workplace, perform_each
 from gecar.reality.discovery import discover
@@ -23,6 +24,7 @@ from gecar.reality.materiality import Material
 from gecar.reality.recordings.recording import Case
 from gecar.reality.verdict import Verdict
 from gecar.report.verdict import words
+from gecar.world.effects import Effect
 from gecar.world.robot import Robot, write_robot
 
 
@@ -34,7 +36,7 @@ class Task:
     ----------
     case
         The recordings.
-    holdout, robot, seed, workers, with_formula, material, program
+    holdout, robot, seed, workers, with_formula, catalogue, material, program, language, invents
         As `gecar.reality.discovery.discover`.
     pictures
         Whether to draw.
@@ -47,8 +49,11 @@ class Task:
     workers: int | None
     with_formula: bool
     pictures: bool
+    catalogue: Sequence[Effect]
     material: Material
     program: Program | None
+    language: Grammar | None
+    invents: bool
 
 
 class Told(NamedTuple):
@@ -73,7 +78,8 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     """
     verdict = discover(
         task.case, task.holdout, task.robot, task.seed, task.workers, tell, task.with_formula,
-        material=task.material, program=task.program,
+        catalogue=task.catalogue, material=task.material, program=task.program, language=task.language,
+        invents=task.invents,
     )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     table = json_ready(verdict.as_json())

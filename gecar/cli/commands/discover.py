@@ -64,6 +64,20 @@ def discover(
         typer.Option("--program", metavar="FILE", show_default=False,
                      help="A program or a run folder: report errors as changes of its arrival time, too."),
     ] = None,
+    invent: Annotated[
+        bool | None,
+        typer.Option("--invent/--no-invent", show_default="where something material is left unexplained",
+                     help="Write a law for what no effect explains, and make it a part of the robot."),
+    ] = None,
+    physics: Annotated[
+        str,
+        typer.Option("--physics", metavar="FILE", help="The language laws are written in, as BNF."),
+    ] = "physics",
+    without: Annotated[
+        str,
+        typer.Option("--without", metavar="EFFECTS", show_default=False,
+                     help="Effects that shall not be found, with commas between: what law would be written instead?"),
+    ] = "",
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
@@ -74,6 +88,7 @@ def discover(
       gecar discover recordings/monday --out verdicts/monday
       gecar discover recordings/monday --holdout run_07,run_08 --json
       gecar discover recordings/monday --material 2 --program runs/evolve-001
+      gecar discover recordings/monday --without battery_resistance
       gecar discover recordings/* --out verdicts --executor process
       gecar evolve --robot verdicts/monday/robot.toml
     """
@@ -81,7 +96,9 @@ def discover(
     from gecar.cli.inputs import find_program, warnings_of
     from gecar.language.program import read_program
     from gecar.parallel.executors import usable_cores
+    from gecar.reality.invent.sentences import physics_grammar
     from gecar.reality.recordings.recording import read_case
+    from gecar.world.effects import CATALOGUE
     from gecar.world.robot import load_robot
 
     if not material > 0.0:
@@ -93,10 +110,25 @@ def discover(
         raise expected("--executor", repr(kind), "serial, process or dask")
     output, names = Output(as_json), [name.strip() for name in holdout.split(",") if name.strip()]
     known, threads = load_robot(robot) if robot else None, (workers or None) if kind == "serial" else 1
+    catalogue = [effect for effect in CATALOGUE if effect.id not in effects_named(without)]
+    language = None if invent is False else physics_grammar(physics)
     driven = read_program(find_program(program)[0]) if program is not None else None
     line = Material(material)
     tasks = {
-        folder: Task(read_case(case), names, known, seed, threads, with_formula, pictures, line, driven)
+        folder: Task(
+            read_case(case),
+            names,
+            known,
+            seed,
+            threads,
+            with_formula,
+            pictures,
+            catalogue,
+            line,
+            driven,
+            language,
+            bool(invent),
+        )
         for folder, case in folders(out, cases).items()
     }
     for task in tasks.values():
@@ -109,6 +141,23 @@ def discover(
     told = conclude(tasks[out], out, teller(output))
     say(output, told, out)
     output.print_json(told.table)
+
+
+def effects_named(names: str) -> list[str]:
+    """Return the effects of a list with commas between.
+
+    Raises
+    ------
+    InputError
+        If there is no such effect.
+    """
+    from gecar.world.effects import BY_ID
+
+    found = [name.strip() for name in names.split(",") if name.strip()]
+    for name in found:
+        if name not in BY_ID:
+            raise expected("--without", f"'{name}'", f"an effect of the catalogue: {', '.join(BY_ID)}")
+    return found
 
 
 def folders(out: Path, cases: Sequence[Path]) -> dict[Path, Path]:

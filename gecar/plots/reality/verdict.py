@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from gecar.plots.courses.course import draw_course
+from gecar.plots.reality.law import laws_figure
 from gecar.plots.style import (
     BLUE,
     FAINT,
@@ -65,6 +66,8 @@ def verdict_drawings(verdict: Verdict, told: Told | None = None) -> dict[str, Ca
     }
     if any(run.replayer.has_poses for run in verdict.evidence.fitted.recordings):
         drawings["map"] = map_figure
+    if verdict.invented:
+        drawings["law"] = laws_figure
     return drawings
 
 

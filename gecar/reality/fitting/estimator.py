@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.discrepancy import Discrepancy
 from gecar.reality.fitting.model import Effects, Model
-from gecar.reality.fitting.parameters import Parameters, free
+from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import (
@@ -29,6 +30,14 @@ Array = npt.NDArray[np.float64]
 CACHED_FITS = 2  # whose sensitivities are kept: ten megabytes each
 REFINED_SPREAD = 0.25  # of a parameter's search spread: about a fit that least squares has refined
 LEAST_NORM = 1e-6  # weighted sensitivities smaller than this say nothing
+
+
+class FreeParameters(Protocol):
+    """What maps vectors to physics records."""
+
+    def physics(self, z: Array) -> npt.NDArray[Any]:
+        """Return the physics records of one vector, or of m."""
+        ...
 
 
 class Estimator:
@@ -65,17 +74,17 @@ class Estimator:
 
     def cost_of(self, errors: Array) -> float:
         """Return the robust cost of residuals in units of the sensors' noise, shape (n,)."""
-        return cost(self._whitened(errors))
+        return cost(self.whitened(errors))
 
     def known(self) -> Model:
         """Return the robot as it is known, with nothing fitted."""
         return self._model((), np.zeros(0))
 
-    def residual(self, parameters: Parameters) -> Residual:
+    def residual(self, parameters: FreeParameters) -> Residual:
         """Return the function that fits minimise."""
 
         def residual(z: Array) -> Array:
-            errors = self._whitened(self.residuals.errors_of_each(parameters.physics(z)))
+            errors = self.whitened(self.residuals.errors_of_each(parameters.physics(z)))
             return errors if z.ndim == 2 else errors[0]
 
         return residual
@@ -119,7 +128,7 @@ class Estimator:
 
     def sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
         """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k)."""
-        return [self._whitened(slopes.T).T for slopes in self.plain_sensitivities(model, effects)]
+        return [self.whitened(slopes.T).T for slopes in self.plain_sensitivities(model, effects)]
 
     def plain_sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
         """Return the same of residuals in units of the sensors' noise; those of the last few fits are kept."""
@@ -164,7 +173,8 @@ class Estimator:
             return 0.0
         return 0.5 * float(np.sum((np.linalg.qr(g)[0].T @ (w * model.errors)) ** 2))
 
-    def _whitened(self, errors: Array) -> Array:
+    def whitened(self, errors: Array) -> Array:
+        """Return residuals, shape (n,) or (m, n), in units of what the sensors and the model are off by."""
         return errors if self.discrepancy is None else self.discrepancy.whitened(errors)
 
     def _model(self, effects: tuple[str, ...], z: Array) -> Model:

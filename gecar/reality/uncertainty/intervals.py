@@ -12,6 +12,7 @@ from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.profile import RISE_95, reaches
+from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
@@ -36,15 +37,19 @@ def half_widths(estimator: Estimator, model: Model) -> Array:
 
     Sources: White, Econometrica 48 (1980) 817; Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
     """
-    slopes, errors = estimator.own_sensitivities(model), model.errors
+    return half_widths_of(estimator.own_sensitivities(model), model.errors, estimator.blocks)
+
+
+def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
+    """Return the same of any fit, from its residuals, shape (n,), and their sensitivities, (n, k)."""
     w = weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
-    scores = np.stack([np.bincount(estimator.blocks.spans, s * w * errors) for s in slopes.T], axis=1)
+    scores = np.stack([np.bincount(blocks.spans, s * w * errors) for s in slopes.T], axis=1)
     sandwich = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 0.0)
     leaps = []
-    for k in np.unique(estimator.blocks.folds):
-        rows = estimator.blocks.folds == k
+    for k in np.unique(blocks.folds):
+        rows = blocks.folds == k
         part = slopes[rows].T @ (w[rows, None] * slopes[rows])
         leaps.append(
             np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))

@@ -55,8 +55,8 @@ _LARGEST_EXPONENT = 50.0
 _TIME, _COMMAND, _VOLTAGE, _CURRENT, _ANGLE, _SPEED, _LOAD, _SLIP, _OTHER_ANGLE, _OTHER_SPEED, _OF_SIDE = (
     range(11)
 )
-_AHEAD, _ASIDE, _TURN_RATE, _X, _Y, _HEADING, _DISTANCE, _READING, _STORE = range(11, 20)
-assert VARIABLE["store"] == _STORE
+_AHEAD, _ASIDE, _TURN_RATE, _X, _Y, _HEADING, _DISTANCE, _READING, _STORE, _DRAW = range(11, 21)
+assert VARIABLE["draw"] == _DRAW
 
 _PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_LOAD, _PORT_GRIP = range(7)
 _PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
@@ -67,7 +67,7 @@ _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
 _PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
 _NEGATIVE, _ABS, _SIGN, _SQUARE = (OPERATOR[name] for name in ("negative", "abs", "sign", "square"))
 _SQRT, _EXP, _SIN, _COS = (OPERATOR[name] for name in ("sqrt", "exp", "sin", "cos"))
-_TANH = OPERATOR["tanh"]
+_TANH, _RAMP = OPERATOR["tanh"], OPERATOR["ramp"]
 _LAST_OF_TWO = FIRST_OPERATOR + OF_TWO
 
 
@@ -93,7 +93,7 @@ def _of_two(code: int, a: float, b: float) -> float:
 
 
 @kernel
-def _of_one(code: int, a: float) -> float:  # noqa: PLR0911
+def _of_one(code: int, a: float) -> float:  # noqa: C901, PLR0911
     if code == _NEGATIVE:
         return -a
     if code == _ABS:
@@ -112,6 +112,8 @@ def _of_one(code: int, a: float) -> float:  # noqa: PLR0911
         return math.cos(a)
     if code == _TANH:
         return math.tanh(a)
+    if code == _RAMP:
+        return max(a, 0.0)
     return 1.0 if a > 0.0 else 0.0
 
 
@@ -164,6 +166,8 @@ def _look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, 
     v.of[1, _SPEED] = v.of[0, _OTHER_SPEED] = s.right_speed
     v.of[0, _CURRENT] = motor_current(s.left_drive, s.voltage, s.left_speed, p)
     v.of[1, _CURRENT] = motor_current(s.right_drive, s.voltage, s.right_speed, p)
+    draw = max(s.left_drive * v.of[0, _CURRENT], 0.0) + max(s.right_drive * v.of[1, _CURRENT], 0.0)
+    v.of[0, _DRAW] = v.of[1, _DRAW] = draw
     v.of[0, _LOAD] = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
     v.of[1, _LOAD] = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
     v.of[0, _SLIP] = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)

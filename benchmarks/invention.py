@@ -1,0 +1,196 @@
+"""What laws are worth: the catalogue's effects taken out in turn, physics in no list, and nothing at all.
+
+python -m benchmarks.concealed plan --seed 1 --world continuous:none=6,single=36,outside=12 --out runs/cases
+python -m benchmarks.invention runs/cases --out runs/invention
+
+Each case with one effect is looked at with a catalogue without it (``gecar discover --without``); all others with the
+whole catalogue; and a law is asked for in each (``--invent``). Of every case: the gap closed on recordings set aside,
+open loop; whether a law stands at a port where that physics acts (`PORTS_OF`, written before any case was drawn), and
+looks at the variables it depends on; the time it took. Goes on where it was stopped, and writes table.md.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from argparse import ArgumentParser
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gecar.cli.output import plain
+from gecar.files import write_whole
+from gecar.reality.discovery import discover
+from gecar.reality.invent.sentences import physics_grammar
+from gecar.reality.recordings.recording import read_case
+from gecar.report.table import piped
+from gecar.world.effects import CATALOGUE
+
+_MOTOR = ("motor_torque", "command", "gear_friction")
+_FORCE = ("force_x", "force_y", "force_toward")
+# Where each physics acts, and what it depends on; "": nothing. What has no port is left out of the count of ports.
+PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "coulomb_friction": (("gear_friction", "motor_torque"), ("", "speed")),
+    "viscous_friction": (("motor_torque", "gear_friction"), ("speed",)),
+    "static_friction": (("gear_friction", "motor_torque"), ("speed",)),
+    "friction_asymmetry": (_MOTOR, ("speed", "command")),
+    "dead_band": (("command", "motor_torque"), ("command",)),
+    "full_duty": (("command", "supply_voltage", "motor_torque"), ("command",)),
+    "command_slew": (("command",), ("store", "command")),
+    "motor_gain_asymmetry": (("command", "motor_torque"), ("command", "side")),
+    "supply_voltage": (("supply_voltage", "command"), ("", "command")),
+    "battery_resistance": (("supply_voltage",), ("draw", "current")),
+    "battery_drain": (("supply_voltage",), ("time",)),
+    "torque_ripple": (_MOTOR, ("angle",)),
+    "speed_limit": (_MOTOR, ("speed",)),
+    "wheel_radius": (("rolling_radius",), ("",)),
+    "wheel_radius_difference": (("rolling_radius",), ("side",)),
+    "tyre_friction": (("tyre_grip", "wheel_load"), ("",)),
+    "slippery_patch": (("tyre_grip", "wheel_load"), ("x", "y")),
+    "caster_drag": (("yaw_moment", "force_ahead"), ("turn_rate", "ahead")),
+    "rolling_resistance": (("gear_friction", "motor_torque", "force_ahead"), ("", "speed", "ahead", "load")),
+    "floor_tilt": (_FORCE, ("", "distance")),
+    "load_transfer": (("wheel_load", "tyre_grip"), ("ahead", "aside", "turn_rate", "load")),
+    "com_offset": (("yaw_moment", "wheel_load", "force_aside"), ("turn_rate", "ahead", "aside")),
+    "sensor_gain": (("colour_reading",), ("", "reading")),
+    "off_centre_wheel": (("rolling_radius",), ("angle",)),
+    "oval_wheel": (("rolling_radius",), ("angle",)),
+    "tether": (_FORCE, ("distance", "x", "y")),
+    "magnet": (_FORCE, ("distance", "x", "y")),
+    "wavy_floor": ((*_FORCE, "force_ahead"), ("x", "y")),
+    "air_drag": (("force_ahead", "motor_torque"), ("ahead", "speed")),
+    "floor_ridge": ((*_FORCE, "tyre_grip", "wheel_load"), ("distance", "x", "y")),
+    "camera_lens": (("pose_x", "pose_y"), ("x", "y")),
+    "ambient_light": (("colour_reading",), ("x", "y", "time", "")),
+    "pose_drift": (("pose_x", "pose_y", "pose_heading"), ("time",)),
+    "motor_heat": (("motor_torque", "supply_voltage", "command"), ("store", "time")),
+    "loosening_wheel": (("rolling_radius",), ("time",)),
+    "current_limit": (("motor_torque", "command"), ("current",)),
+    "yaw_pull": (("yaw_moment",), ("",)),
+    "shared_drop": (("supply_voltage",), ("draw", "current", "command")),
+    "carpet_pile": ((*_FORCE, "force_ahead", "yaw_moment"), ("heading", "")),
+}
+NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
+"""Noise by nature, or a thing that happened once: nothing is to be invented."""
+
+
+def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any]:
+    """Return what a case's verdict says with laws asked for, and what it is worth."""
+    concealed = [effect["id"] for effect in label["effects"]]
+    outside = (label.get("outside") or {}).get("id")
+    single = len(concealed) == 1 and outside is None
+    catalogue = [effect for effect in CATALOGUE if not single or effect.id not in concealed]
+    began = time.process_time(), time.perf_counter()
+    verdict = discover(
+        read_case(folder), seed=seed, workers=1, catalogue=catalogue, language=physics_grammar(), invents=True
+    )
+    table = verdict.as_json()
+    return plain(
+        {
+            "kind": "none" if not concealed and outside is None else "single" if single else "outside",
+            "concealed": outside or (concealed[0] if concealed else ""),
+            "verdict": verdict.verdict,
+            "effects": [found.id for found in verdict.effects],
+            "material": verdict.residual.material,
+            "gap_closed": verdict.judgement.gap_closed,
+            "invented": table["invented"],
+            "typeset": [law.term.typeset for law in verdict.invented],
+            "seconds": time.process_time() - began[0],
+            "wall_s": time.perf_counter() - began[1],
+        }
+    )  # type: ignore[return-value]
+
+
+def port_right(case: dict[str, Any]) -> bool | None:
+    """Whether a law, or one that can not be told from it, stands where the physics acts; None where nothing says."""
+    if case["concealed"] not in PORTS_OF or not case["invented"]:
+        return None
+    wanted = PORTS_OF[case["concealed"]][0]
+    return any(
+        law["port"] in wanted or any(o["port"] in wanted for o in law["or"]) for law in case["invented"]
+    )
+
+
+def variables_right(case: dict[str, Any]) -> bool | None:
+    """Whether a law looks at what the physics depends on."""
+    if case["concealed"] not in PORTS_OF or not case["invented"]:
+        return None
+    wanted = PORTS_OF[case["concealed"]][1]
+    return any(
+        any(name in law["variables"] for name in wanted) or ("" in wanted and not law["variables"])
+        for law in case["invented"]
+    )
+
+
+def table(cases: dict[str, dict[str, Any]]) -> str:
+    """Write a case a row, and what they come to."""
+    rows = [["case", "concealed", "verdict", "named", "laws", "gap closed", "port", "CPU s"]]
+    for name, case in sorted(cases.items(), key=lambda item: (item[1]["kind"], item[1]["concealed"])):
+        closed = "-" if case["gap_closed"] is None else f"{case['gap_closed']:.2f}"
+        port = {None: "-", True: "yes", False: "no"}[port_right(case)]
+        laws = "; ".join(f"`{words}`" for words in case["typeset"]) or "-"
+        named = ", ".join(case["effects"]) or "-"
+        what = case["concealed"] or "nothing"
+        rows.append([name, what, case["verdict"], named, laws, closed, port, f"{case['seconds']:.0f}"])
+    return piped(rows) + "\n" + _summary(list(cases.values()))
+
+
+def _summary(cases: list[dict[str, Any]]) -> str:
+    lines = []
+    lawful = [c for c in cases if c["concealed"] in PORTS_OF]
+    for kind in ("single", "outside"):
+        closed = [
+            c["gap_closed"]
+            for c in lawful
+            if c["kind"] == kind and c["invented"] and c["gap_closed"] is not None
+        ]
+        written = sum(bool(c["invented"]) for c in lawful if c["kind"] == kind)
+        of = sum(c["kind"] == kind for c in lawful)
+        middle = f"{np.median(closed):.2f}" if closed else "-"
+        lines.append(
+            f"{kind}: a law in {written} of {of} that have a port; gap closed there, median {middle}"
+        )
+    for words, right in (("port", port_right), ("variables", variables_right)):
+        judged = [right(c) for c in cases if right(c) is not None]
+        lines.append(f"{words} right: {sum(map(bool, judged))} of {len(judged)}")
+    for words, some in (
+        ("nothing concealed", [c for c in cases if c["kind"] == "none"]),
+        ("noise by nature", [c for c in cases if c["concealed"] in NO_LAW]),
+    ):
+        lines.append(
+            f"{words}: something invented in {sum(bool(c['invented']) for c in some)} of {len(some)}"
+        )
+    lines.append(f"processor time a case: median {np.median([c['seconds'] for c in cases]):.0f} s")
+    return "".join(f"- {line}\n" for line in lines)
+
+
+def main() -> None:
+    """Look at all cases that were not looked at yet, and write the table."""
+    parser = ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("cases", type=Path, help="as benchmarks.concealed draws them: cases/ and sealed/")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    labels = {
+        f.parent.name: json.loads(f.read_text())
+        for f in sorted((given.cases / "sealed").glob("*/label.json"))
+    }
+    waiting = [name for name in labels if not (given.out / f"{name}.json").exists()]
+    with ProcessPoolExecutor(given.workers) as pool:
+        jobs = {pool.submit(look_at, given.cases / "cases" / name, labels[name]): name for name in waiting}
+        for job in as_completed(jobs):
+            write_whole(given.out / f"{jobs[job]}.json", json.dumps(job.result(), indent=1) + "\n")
+            print(
+                f"{jobs[job]}: {job.result()['concealed'] or 'nothing'} -> {job.result()['typeset']}",
+                flush=True,
+            )
+    found = {name: json.loads((given.out / f"{name}.json").read_text()) for name in labels}
+    write_whole(given.out / "table.md", table(found))
+    print(table(found))
+
+
+if __name__ == "__main__":
+    main()

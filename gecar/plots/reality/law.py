@@ -1,0 +1,104 @@
+"""Invented laws as curves with their 95 % bands; grey where no recording went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gecar.plots.style import BLUE, FAINT, INK, headline, look, new_figure
+from gecar.reality.verdict import Invented, Verdict
+from gecar.world.ports import BY_PORT, VARIABLE, VARIABLES
+from gecar.world.terms import Term
+
+Array = npt.NDArray[np.float64]
+
+BEYOND = 0.3  # of the range: how far the curve goes on where no recording went
+POINTS = 400
+DRAWS = 200  # of constants within their intervals, for the band
+_VARIABLES = {variable.id: variable for variable in VARIABLES}
+_ANGLES = ("angle", "other_angle", "heading")
+
+
+def laws_figure(verdict: Verdict) -> Figure:
+    """Draw every law a verdict holds, each against the variable it depends on most."""
+    laws = verdict.invented
+    figure = new_figure(8.0, 1.2 + 2.7 * len(laws))
+    with look():
+        for axes, law in zip(
+            np.atleast_1d(figure.subplots(len(laws), 1, squeeze=False)[:, 0]), laws, strict=True
+        ):
+            _draw_law(axes, law)
+        headline(figure, "The law that was written", "95 % band; grey: no recording went there")
+    return figure
+
+
+def _draw_law(axes: Axes, law: Invented) -> None:
+    term, port = law.term, BY_PORT[law.term.port]
+    name = _telling(law)
+    unit = "" if port.unit == "-" else f" [{port.unit}]"
+    axes.set(title=term.typeset, ylabel=f"{port.title}{unit}")
+    axes.title.set_fontsize(9)
+    if name is None:
+        value = float(term.value({"time": np.zeros(1)})[0])
+        ends = [term.with_constants(_ends(law, k)) for k in (0, 1)]
+        low, high = sorted(float(end.value({"time": np.zeros(1)})[0]) for end in ends)
+        axes.axhspan(low, high, color=BLUE, alpha=0.18, linewidth=0)
+        axes.axhline(value, color=BLUE)
+        axes.axhline(0.0, color=INK, linewidth=0.6)
+        axes.set(xticks=[], xlabel="always the same")
+        return
+    low, high = (0.0, 2.0 * np.pi) if name in _ANGLES else law.range[name]
+    beyond = 0.0 if name in _ANGLES else BEYOND * (high - low)
+    at = np.linspace(low - beyond, high + beyond, POINTS)
+    inside = (at >= low) & (at <= high)
+    curve = _curve(law, term, name, at)
+    rng = np.random.default_rng(0)
+    drawn = np.array([_curve(law, _drawn(law, rng), name, at) for _ in range(DRAWS)])
+    band = np.quantile(drawn, (0.025, 0.975), axis=0)
+    axes.fill_between(at[inside], band[0, inside], band[1, inside], color=BLUE, alpha=0.18, linewidth=0)
+    axes.axvspan(at[0], low, color=FAINT, alpha=0.6, linewidth=0)
+    axes.axvspan(high, at[-1], color=FAINT, alpha=0.6, linewidth=0)
+    axes.plot(at, curve, color=FAINT, linestyle="--")
+    axes.plot(at[inside], curve[inside], color=BLUE)
+    axes.axhline(0.0, color=INK, linewidth=0.6)
+    variable = _VARIABLES[name]
+    shown = "" if variable.unit == "-" else f" [{variable.unit}]"
+    axes.set(xlim=(at[0], at[-1]), xlabel=f"{variable.title}{shown}")
+
+
+def _telling(law: Invented) -> str | None:
+    """Return the variable that a law changes most with over its range; None where it is always the same."""
+    spread = {
+        name: float(np.ptp(_curve(law, law.term, name, np.linspace(*_ends_of(law, name), POINTS))))
+        for name in law.range
+        if name != "side"
+    }
+    return max(spread, key=lambda name: spread[name], default=None)
+
+
+def _ends_of(law: Invented, name: str) -> tuple[float, float]:
+    return (0.0, 2.0 * np.pi) if name in _ANGLES else law.range[name]
+
+
+def _curve(law: Invented, term: Term, name: str, at: Array) -> Array:
+    """Return a law over one variable, the others at what is usual."""
+    usual: dict[str, Array] = {}
+    for other in VARIABLE:
+        low, high = law.range.get(other, (0.0, 0.0))
+        middle = max((low, high), key=abs) if low * high < 0.0 or other == "side" else 0.5 * (low + high)
+        usual[other] = np.full(len(at), middle)
+    return term.value({**usual, name: at})
+
+
+def _drawn(law: Invented, rng: np.random.Generator) -> Term:
+    """Return a law with its constants drawn from their intervals."""
+    values = {n: float(rng.normal(i.value, (i.high - i.low) / 3.92)) for n, i in law.parameters.items()}
+    return law.term.with_constants({n: v for n, v in values.items() if n != "store_s"})
+
+
+def _ends(law: Invented, which: int) -> Mapping[str, float]:
+    return {n: (i.low, i.high)[which] for n, i in law.parameters.items() if n != "store_s"}

@@ -1,0 +1,245 @@
+"""Invent the missing law: where no effect of the catalogue explains what is left, a law of its own is written.
+
+    library = Library(problem, model)                      # sensitivities of residuals to laws
+    laws    = search(library, grammar, ports)              # all single laws, then Grammatical Evolution
+    proved  = left out recordings ask for the best of them, more than chance would give any of them,
+              and recordings set aside come out better with it
+
+Then the same again, on top of it, for what is still left. The law becomes a part of the robot (`gecar.world.terms`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.language.grammar import Grammar
+from gecar.reality.fitting.estimator import Estimator
+from gecar.reality.fitting.model import Effects, Model
+from gecar.reality.fitting.parameters import free
+from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
+from gecar.reality.invent.looks import looks_like
+from gecar.reality.invent.proof import largest_gains, left_out_gains, sensitivities
+from gecar.reality.invent.search import Law, Library, search
+from gecar.reality.invent.states import ranges
+from gecar.reality.optimisation.least_squares import cost, least_squares
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.share import share_asked_for, spread_of_size
+from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE, SIGNIFICANCE
+from gecar.reality.uncertainty.intervals import half_widths_of
+from gecar.reality.verdict import Interval, Invented
+from gecar.world.ports import PORTS
+from gecar.world.terms import Term
+
+Array = npt.NDArray[np.float64]
+
+MOST_LAWS = 3
+HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
+ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Written:
+    """Laws written on top of an explanation.
+
+    Attributes
+    ----------
+    explained
+        The explanation with the robot that has them, and what is left then.
+    terms
+        The laws, their constants fitted together.
+    invented
+        What the verdict says of each.
+    """
+
+    explained: Explanation
+    terms: tuple[Term, ...]
+    invented: tuple[Invented, ...]
+
+
+def invent(
+    explained: Explanation,
+    held: Residuals,
+    grammar: Grammar,
+    seed: int = 0,
+    tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+) -> Written:
+    """Write laws for what an explanation leaves, one after the other, as long as each proves itself.
+
+    Parameters
+    ----------
+    explained
+        Of the recordings fitted on.
+    held
+        Residuals of the same kind, of the recordings set aside.
+    grammar
+        The language of laws.
+    seed
+        Random seed.
+    tell
+        Called with a line of progress.
+    """
+    ports, problem = _ports(explained.problem), explained.problem
+    known = problem.estimator.at(explained.taken, explained.taken.z)  # whitened as this problem has it
+    written = Written(replace(explained, taken=known), (), ())
+    for number in range(MOST_LAWS):
+        here = written.explained
+        library = Library(here.problem, here.taken)
+        found = search(library, grammar, ports, seed + number, tell)
+        nulls = largest_gains(library, seed)
+        proved = next((law for law in found[:3] if _is_proved(library, law, nulls)), None)
+        if proved is None:
+            break
+        more = _pruned(_added(written, explained, library, proved), explained)
+        gain = _gain_set_aside(written.explained, more.explained, held)
+        if gain is None:
+            break
+        told = _told(library, proved, _indistinguishable(proved, found), nulls, gain)
+        written = replace(more, invented=(*written.invented, *told))
+        tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in proved.terms)}")
+        if not written.explained.unexplained:
+            break
+    return written
+
+
+def _ports(problem: Problem) -> list[str]:
+    """Return the ports whose laws can show in a problem's residuals."""
+    runs = problem.residuals.recordings
+    measured = [np.flatnonzero(~np.isnan(run.replayer.measured).all(axis=0)).tolist() for run in runs]
+    sensors = {"colour"} if problem.residuals.sensor else {""}
+    if not problem.residuals.sensor:
+        sensors |= {"camera"} if any(run.replayer.has_poses for run in runs) else set()
+        sensors |= {"encoders"} if any(0 in seen or 1 in seen for seen in measured) else set()
+        sensors |= {"gyro"} if any(3 in seen for seen in measured) else set()
+    return [port.id for port in PORTS if port.sensor in sensors and (port.on_bench or not problem.on_bench)]
+
+
+def _is_proved(library: Library, law: Law, nulls: Array) -> bool:
+    """Whether left-out recordings ask for a law, more than chance would give any law of the search."""
+    if law.worth < PRICE:
+        return False
+    gains = left_out_gains(library, law)
+    p = (1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls))
+    return bool(p < SIGNIFICANCE and np.mean(gains > 0.0) > 0.5)
+
+
+def _added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
+    """Return laws with one more, all constants fitted together anew, and what is left then."""
+    problem, effects = first.problem, library.model.effects
+    terms = (*written.terms, *law.terms)
+    parameters = free(problem.estimator.robot, effects)
+    together = FreeTerms(parameters, law.minimum.z[: parameters.size], terms)
+    residual = library.problem.estimator.residual(together)
+    found = least_squares(residual, together.z, together.bounds, together.probes, ROUNDS)
+    terms, values = together.fitted(found.z), parameters.values(found.z[: parameters.size])
+    return replace(written, explained=_explained_with(first, terms, effects, values), terms=terms)
+
+
+def _pruned(written: Written, first: Explanation) -> Written:
+    """Return laws beside those effects alone that still gain enough beside them: others had stood in for a law."""
+    problem = written.explained.problem
+    for effect in written.explained.taken.effects:
+        here = written.explained.taken
+        rest = tuple(e for e in here.effects if e != effect)
+        parameters = free(first.problem.estimator.robot, rest)
+        without = FreeTerms(parameters, parameters.vector(here.values), written.terms)
+        residual = problem.estimator.residual(without)
+        found = least_squares(residual, without.z, without.bounds, without.probes, ROUNDS)
+        if found.cost - here.cost < PRICE:
+            terms, values = without.fitted(found.z), parameters.values(found.z[: parameters.size])
+            explained = _explained_with(first, terms, rest, values, problem)
+            written = replace(written, explained=explained, terms=terms)
+    return written
+
+
+def _explained_with(
+    first: Explanation,
+    terms: Sequence[Term],
+    effects: Sequence[str],
+    values: Effects,
+    under: Problem | None = None,
+) -> Explanation:
+    """Return an explanation of a robot that has more terms, with some of the effects; ``under`` another's discrepancy.
+
+    What was too small for a name beside the unexplained is not looked at again.
+    """
+    problem = first.problem
+    robot = problem.estimator.robot
+    robot = robot.with_terms([*robot.term, *terms])
+    estimator = Estimator(problem.residuals, robot, problem.estimator.rng)
+    problem = replace(problem, estimator=estimator.under(under.estimator.discrepancy if under else None))
+    parameters = free(robot, effects)
+    bare = replace(first.taken, effects=tuple(effects), parameters=parameters)
+    model: Model = problem.estimator.at(bare, parameters.vector(values))
+    problem = problem if under else problem.under(model)
+    model = problem.estimator.at(model, model.z)
+    left = problem.sizes.left(problem.with_small_changes(model))
+    before = first.problem.sizes.left(first.problem.known.physics)
+    now, was = (problem.material.times(size) for size in (left, before))
+    return replace(
+        first,
+        problem=problem,
+        taken=model,
+        steps=tuple(step for step in first.steps if step.effect in effects),
+        minor=(),
+        whole=model,
+        left=left,
+        unexplained=now > MEASURED and now / max(was, 1.0) > LEFT_SHARE,
+    )
+
+
+def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) -> float | None:
+    """Return what a law gains on recordings set aside; None where they do not ask for it, or part as far with it."""
+    if not held.recordings:
+        return 0.0
+    physics = [e.problem.with_small_changes(e.taken) for e in (before, after)]
+    without, having = (held.errors(p) for p in physics)
+    asked = share_asked_for(held.index, without, having)
+    was, now = (before.problem.material.times(before.problem.sizes.of(held).left(p)) for p in physics)
+    return cost(without) - cost(having) if asked.margin > 0.0 and now < HELPS * was else None
+
+
+def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
+    """Return the best law at each other port that gains nearly as much: these recordings can not tell them apart."""
+    out: dict[str, Law] = {}
+    for other in found:
+        close = law.gain - other.gain <= max(min(CLOSE * law.gain, PRICE), 0.02 * law.gain)
+        if other.terms[0].port != law.terms[0].port and close:
+            out.setdefault(other.terms[0].port, other)
+    return list(out.values())
+
+
+def _told(
+    library: Library, law: Law, others: Sequence[Law], nulls: Array, held_gain: float
+) -> list[Invented]:
+    """Return what the verdict says of each term of a law."""
+    problem, of_effects = library.problem, law.parameters.model.size
+    half = half_widths_of(sensitivities(library, law), law.minimum.errors, problem.estimator.blocks)
+    parameters: list[dict[str, Interval]] = [{} for _ in law.terms]
+    for c, z, reach in zip(
+        law.parameters.constants, law.minimum.z[of_effects:], half[of_effects:], strict=True
+    ):
+        ends = sorted(float(c.at(z + side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
+        parameters[c.term][c.name] = Interval(float(c.at(z)), ends[0], ends[1], "")
+    left_out, physics = float(left_out_gains(library, law).sum()), law.parameters.physics(law.minimum.z)
+    return [
+        Invented(
+            term=term,
+            alternatives=tuple(each for other in others for each in other.terms),
+            parameters=parameters[k],
+            looks_like=looks_like(term),
+            holdout_gain=held_gain,
+            left_out_gain=left_out,
+            null_95=float(np.quantile(nulls, 0.95)),
+            p=float((1 + np.sum(nulls >= left_out)) / (1 + len(nulls))),
+            spread=spread_of_size(problem.estimator.blocks.folds, library.model.errors, law.minimum.errors),
+            range=ranges(term, problem.residuals.recordings, physics),
+            size=problem.sizes.apart(physics, library.model.physics),
+        )
+        for k, term in enumerate(law.terms)
+    ]

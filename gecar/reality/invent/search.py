@@ -1,0 +1,313 @@
+"""The search for a law: every single law of the language by its sensitivity, then Grammatical Evolution from there.
+
+A law's worth is what it gains, in log-likelihood beside what the simulation is off by anyway, less its length. Linear
+constants are fitted by weighted least squares on the residuals' sensitivities, with the model's own parameters free
+beside them; nothing measured is ever differentiated. The best laws are then fitted in full.
+
+Sources: Grammatical Evolution, O'Neill and Ryan, IEEE T-EC 5 (2001) 349; description length, Rissanen, Automatica 14
+(1978) 465; score test, Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.problem import Problem as EvolvedProblem
+from gecar.evolution.settings import EvolutionSettings
+from gecar.language.grammar import Grammar
+from gecar.language.mapping import Mapped, Mapper
+from gecar.reality.fitting.model import Model
+from gecar.reality.invent.free_terms import FreeTerms, usual_size
+from gecar.reality.invent.sentences import (
+    Laws,
+    at_ports,
+    complexity,
+    joined,
+    key,
+    linear,
+    parts_of,
+    pieces,
+    read_sentence,
+    single_laws,
+)
+from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
+from gecar.reality.selection.problem import Problem
+from gecar.world.terms import Term
+
+Array = npt.NDArray[np.float64]
+Column = npt.NDArray[np.float32]
+
+TOGETHER = 64  # laws whose residuals are held at a time
+SMALL_RESPONSE, LARGE_RESPONSE = 0.02, 1.0  # standard deviations: a derivative is taken between
+KEPT_COLUMNS = 400
+KEPT_LAWS = 40  # of those tried one by one, and of those evolved
+PORTS_KEPT = 0.3  # of the best law's gain: what a port's best law must gain for evolution to look there
+A_TOKEN = 1.5  # log-likelihood that a token or a constant of a law must bring: a choice among a handful
+MOST_PARTS = 3  # of a sum
+EVOLUTION = EvolutionSettings(
+    population=80, generations=12, codons=40, elites=4, initialisation="ptc2", initial_expansions=12,
+    crossover="subtree", crossover_rate=0.7, mutation="one_used_codon", duplicates="run", tournament=4,
+)  # fmt: skip
+FINALISTS = 9
+ROUNDS = 8
+OWN_SHARE = 1e-4  # of a column's square that the model's own parameters do not hold; less is none of its own
+MIDDLE = 1e3  # merit of a law that neither gains nor loses: an evolution's merits are above 0
+
+
+@dataclass(frozen=True)
+class Law:
+    """Laws that belong together, fitted on top of a model.
+
+    Attributes
+    ----------
+    terms
+        With their constants fitted.
+    parameters, minimum
+        The model's parameters and the laws' constants, and where the fit ended.
+    gain
+        In log-likelihood.
+    """
+
+    terms: Laws
+    parameters: FreeTerms
+    minimum: Minimum
+    gain: float
+
+    @property
+    def worth(self) -> float:
+        """The gain less the law's length."""
+        return self.gain - A_TOKEN * complexity(self.terms)
+
+
+@dataclass
+class Library:
+    """Sensitivities of residuals to laws of one part.
+
+    Attributes
+    ----------
+    problem, model
+        On top of what model of which problem.
+    scores
+        Of every law tried: the sums over half-second spans of its weighted, projected sensitivity times the residuals,
+        for the null distribution.
+    """
+
+    problem: Problem
+    model: Model
+    scores: dict[str, Column] = field(default_factory=dict)
+    _columns: dict[str, Column] = field(default_factory=dict)
+    _gains: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        estimator = self.problem.estimator
+        self._root = np.sqrt(weights(self.model.errors))
+        self._basis = np.linalg.qr(estimator.own_sensitivities(self.model) * self._root[:, None])[0]
+        self._target = self._projected(self._root * self.model.errors)
+
+    def gain(self, laws: Laws) -> float:
+        """Return what laws gain with their linear constants fitted, by their sensitivities."""
+        name = key(laws)
+        if name not in self._gains:
+            parts = parts_of(laws)
+            self.look_up(parts)
+            if name not in self._gains:
+                self._gains[name] = 0.5 * float(self._target @ self._fit(parts)[0])
+        return self._gains[name]
+
+    def started(self, laws: Laws) -> Laws:
+        """Return laws with their linear constants as the sensitivities have them."""
+        parts = parts_of(laws)
+        self.look_up(parts)
+        values = -self._fit(parts)[1]
+        sized = [
+            part.with_constants({linear(part)[0]: float(value) * usual_size(part)})
+            for part, value in zip(parts, values, strict=True)
+        ]
+        ends = np.cumsum([0, *(len(pieces(term)) for term in laws)]).tolist()
+        return tuple(joined(sized[first:last]) for first, last in itertools.pairwise(ends))
+
+    def look_up(self, parts: Sequence[Term]) -> None:
+        """Take the sensitivities of laws of one part that are not at hand."""
+        wanted = {key((part,)): part for part in parts}
+        self._columns |= {
+            name: self._columns.pop(name) for name in wanted if name in self._columns
+        }  # now the last
+        new = {name: part for name, part in wanted.items() if name not in self._columns}
+        names = list(new)
+        for first in range(0, len(names), TOGETHER):
+            some = names[first : first + TOGETHER]
+            for name, column in zip(some, self._sensitivities([new[name] for name in some]), strict=True):
+                self._keep(name, column)
+
+    def _keep(self, name: str, column: Array) -> None:
+        weighted = column * self._root
+        projected = self._projected(weighted)
+        left = float(projected @ projected)
+        if left <= OWN_SHARE * float(weighted @ weighted):
+            projected, left = np.zeros(len(column)), 1.0
+        self._gains[name] = 0.5 * float(self._target @ projected) ** 2 / left
+        spans = np.bincount(self.problem.estimator.blocks.spans, projected * self._target / np.sqrt(left))
+        self.scores[name] = spans.astype(np.float32)
+        while len(self._columns) >= KEPT_COLUMNS:
+            self._columns.pop(next(iter(self._columns)))
+        self._columns[name] = projected.astype(np.float32)
+
+    def _projected(self, weighted: Array) -> Array:
+        """Return what the model's own parameters leave of a weighted column."""
+        out: Array = weighted - self._basis @ (self._basis.T @ weighted)
+        return out
+
+    def _sensitivities(self, parts: Sequence[Term]) -> list[Array]:
+        """Return the whitened residuals' derivatives by laws' constants, in units of `usual_size`, each shape (n,)."""
+        sizes = np.ones(len(parts))
+        changes = self._changes(parts, sizes)
+        rms = np.sqrt(np.mean(np.square(changes), axis=1))
+        again = np.flatnonzero((rms > LARGE_RESPONSE) | ((rms < SMALL_RESPONSE) & (rms > 1e-9))).tolist()
+        if again:
+            sizes[again] = np.clip(0.3 / rms[again], 1e-4, 100.0)
+            changes[again] = self._changes([parts[k] for k in again], sizes[again])
+        return [change / size for change, size in zip(changes, sizes, strict=True)]
+
+    def _changes(self, parts: Sequence[Term], sizes: Array) -> Array:
+        records = []
+        for part, size in zip(parts, sizes.tolist(), strict=True):
+            sized = part.with_constants({linear(part)[0]: size * usual_size(part)})
+            free = FreeTerms(self.model.parameters, self.model.z, (sized,))
+            records.append(free.physics(free.z))
+        errors = self.problem.residuals.errors_of_each(np.concatenate(records))
+        out: Array = self.problem.estimator.whitened(errors) - self.model.errors
+        return out
+
+    def _fit(self, parts: Sequence[Term]) -> tuple[Array, Array]:
+        """Return the part of the residuals that laws of one part explain together, and their coefficients."""
+        matrix = np.stack([self._columns[key((part,))] for part in parts], axis=1).astype(float)
+        scale = np.maximum(np.sqrt(np.sum(matrix**2, axis=0)), 1e-12)
+        found = np.linalg.lstsq(matrix / scale, self._target, rcond=1e-6)[0]
+        return matrix @ (found / scale), found / scale
+
+
+def search(
+    library: Library,
+    grammar: Grammar,
+    ports: Sequence[str],
+    seed: int = 0,
+    tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+) -> list[Law]:
+    """Return the laws worth most, fitted in full, best first.
+
+    Parameters
+    ----------
+    library
+        Of the model they are to be added to.
+    grammar
+        The language of laws.
+    ports
+        Where laws can show.
+    seed
+        Random seed.
+    tell
+        Called with a line of progress.
+    """
+    there = at_ports(grammar, ports)
+    singles = single_laws(there)
+    tell(f"{len(singles)} laws one by one")
+    for first in range(0, len(singles), TOGETHER):
+        some = singles[first : first + TOGETHER]
+        library.look_up([part for laws in some for part in parts_of(laws)])
+        for laws in some:
+            library.gain(laws)
+    best = max(library.gain(laws) for laws in singles)
+    promising = {t.port for laws in singles for t in laws if library.gain(laws) >= PORTS_KEPT * best}
+    kept = sorted(singles, key=lambda laws: _loss(library, laws))[:KEPT_LAWS]
+    tell(f"laws evolved at {', '.join(port for port in ports if port in promising)}")
+    evolved = _evolved(library, at_ports(there, sorted(promising)), seed)
+    candidates = {key(laws): laws for laws in (*_greedy_sums(library, kept), *evolved, *kept)}
+    ranked = sorted(candidates.values(), key=lambda laws: _loss(library, laws))
+    fitted = [fit(library, library.started(laws)) for laws in _spread_over_ports(ranked)]
+    return sorted(fitted, key=lambda law: -law.worth)
+
+
+def fit(library: Library, laws: Laws) -> Law:
+    """Fit laws' constants together with the model's own parameters."""
+    model = library.model
+    free = FreeTerms(model.parameters, model.z, laws)
+    residual = library.problem.estimator.residual(free)
+    found = least_squares(residual, free.z, free.bounds, free.probes, ROUNDS)
+    return Law(free.fitted(found.z), free, found, model.cost - found.cost)
+
+
+def _loss(library: Library, laws: Laws) -> float:
+    """Return a law's length less what it gains, by its sensitivities."""
+    return A_TOKEN * complexity(laws) - library.gain(laws)
+
+
+def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
+    """Return the first few laws, at most a third of them at one port."""
+    kept: list[Laws] = []
+    for laws in ranked:
+        if len(kept) < FINALISTS and sum(each[0].port == laws[0].port for each in kept) < FINALISTS // 3:
+            kept.append(laws)
+    return kept
+
+
+def _greedy_sums(library: Library, singles: Sequence[Laws]) -> list[Laws]:
+    """Return sums at one port that begin with the best single law there and take the next best beside it."""
+    out: list[Laws] = []
+    plain = [
+        laws[0]
+        for laws in singles
+        if len(laws) == 1 and not laws[0].store and "at_x" not in laws[0].constants
+    ]
+    for port in dict.fromkeys(term.port for term in plain):
+        here = [term for term in plain if term.port == port]
+        chosen = here[:1]
+        while len(chosen) < MOST_PARTS:
+            sums = [total for term in here if term not in chosen and (total := _sum([*chosen, term]))]
+            if not sums:
+                break
+            best = max(sums, key=lambda term: library.gain((term,)))
+            chosen = pieces(best)
+            out.append((best,))
+    return out
+
+
+def _sum(parts: Sequence[Term]) -> Term | None:
+    """Return laws of one part as one sum; None where that would be too long."""
+    try:
+        return joined(parts)
+    except ValueError:
+        return None
+
+
+class _Evolved(EvolvedProblem[Laws]):
+    """Laws as what an evolution evolves: the sentences of a grammar."""
+
+    def read(self, mapped: Mapped, i: int) -> Laws | None:
+        """Return genome i's laws; None where its sentence is none."""
+        try:
+            return read_sentence(mapped.text(i)) if mapped.valid[i] else None
+        except ValueError:
+            return None
+
+    def meaning(self, program: Laws) -> bytes:
+        """Return the laws as bytes."""
+        return key(program).encode()
+
+
+def _evolved(library: Library, grammar: Grammar, seed: int) -> list[Laws]:
+    """Return the best laws of an evolution."""
+    evolution = Evolution(EVOLUTION, Mapper(grammar), _Evolved(), seed=seed)
+    found: dict[str, tuple[float, Laws]] = {}
+    while not evolution.finished:
+        asked = [candidate.program for candidate in evolution.ask()]
+        library.look_up([part for laws in asked for part in parts_of(laws)])
+        losses = [_loss(library, laws) for laws in asked]
+        found |= {key(laws): (loss, laws) for loss, laws in zip(losses, asked, strict=True)}
+        evolution.tell([MIDDLE * (1.0 + min(loss / max(library.model.cost, 1.0), 1.0)) for loss in losses])
+    return [laws for _, laws in sorted(found.values(), key=lambda pair: pair[0])[:KEPT_LAWS]]
