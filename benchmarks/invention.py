@@ -140,6 +140,7 @@ def table(cases: dict[str, dict[str, Any]]) -> str:
 def _summary(cases: list[dict[str, Any]]) -> str:
     lines = []
     lawful = [c for c in cases if c["concealed"] in PORTS_OF]
+    written_in = [c for c in lawful if c["invented"] and c["gap_closed"] is not None]
     for kind in ("single", "outside"):
         closed = [
             c["gap_closed"]

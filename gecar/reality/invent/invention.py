@@ -22,10 +22,10 @@ from gecar.reality.fitting.model import Effects, Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
-from gecar.reality.invent.proof import largest_gains, left_out_gains, sensitivities
+from gecar.reality.invent.proof import largest_gains, left_out_gains
 from gecar.reality.invent.search import Law, Library, search
 from gecar.reality.invent.states import ranges
-from gecar.reality.optimisation.least_squares import cost, least_squares
+from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
@@ -104,7 +104,7 @@ def invent(
         tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in proved.terms)}")
         if not written.explained.unexplained:
             break
-    return written
+    return replace(written, invented=_with_constants_of(written, explained))
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -214,24 +214,33 @@ def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
     return list(out.values())
 
 
+def _with_constants_of(written: Written, first: Explanation) -> tuple[Invented, ...]:
+    """Return what the verdict says of laws, with their constants and intervals as they were fitted together last."""
+    model, problem = written.explained.taken, written.explained.problem
+    parameters = free(first.problem.estimator.robot, model.effects)
+    together = FreeTerms(parameters, model.z, written.terms)
+    residual = problem.estimator.residual(together)
+    slopes = jacobian(residual, together.z, model.errors, together.probes, together.bounds[1])
+    half = half_widths_of(slopes, model.errors, problem.estimator.blocks)[parameters.size :]
+    intervals: list[dict[str, Interval]] = [{} for _ in written.terms]
+    for c, reach in zip(together.constants, half.tolist(), strict=True):
+        ends = sorted(float(c.at(side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
+        intervals[c.term][c.name] = Interval(c.value, ends[0], ends[1], "")
+    told = zip(written.invented, written.terms, intervals, strict=True)
+    return tuple(replace(law, term=term, parameters=found) for law, term, found in told)
+
+
 def _told(
     library: Library, law: Law, others: Sequence[Law], nulls: Array, held_gain: float
 ) -> list[Invented]:
-    """Return what the verdict says of each term of a law."""
-    problem, of_effects = library.problem, law.parameters.model.size
-    half = half_widths_of(sensitivities(library, law), law.minimum.errors, problem.estimator.blocks)
-    parameters: list[dict[str, Interval]] = [{} for _ in law.terms]
-    for c, z, reach in zip(
-        law.parameters.constants, law.minimum.z[of_effects:], half[of_effects:], strict=True
-    ):
-        ends = sorted(float(c.at(z + side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
-        parameters[c.term][c.name] = Interval(float(c.at(z)), ends[0], ends[1], "")
+    """Return what the verdict says of each term of a law, but for its constants."""
+    problem = library.problem
     left_out, physics = float(left_out_gains(library, law).sum()), law.parameters.physics(law.minimum.z)
     return [
         Invented(
             term=term,
             alternatives=tuple(each for other in others for each in other.terms),
-            parameters=parameters[k],
+            parameters={},
             looks_like=looks_like(term),
             holdout_gain=held_gain,
             left_out_gain=left_out,
@@ -241,5 +250,5 @@ def _told(
             range=ranges(term, problem.residuals.recordings, physics),
             size=problem.sizes.apart(physics, library.model.physics),
         )
-        for k, term in enumerate(law.terms)
+        for term in law.terms
     ]
