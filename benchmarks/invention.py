@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from gecar.cli.output import plain
-from gecar.files import write_whole
+from gecar.files import json_ready, write_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.sentences import physics_grammar
 from gecar.reality.recordings.recording import read_case
@@ -87,7 +86,7 @@ def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any
         read_case(folder), seed=seed, workers=1, catalogue=catalogue, language=physics_grammar(), invents=True
     )
     table = verdict.as_json()
-    return plain(
+    return json_ready(
         {
             "kind": "none" if not concealed and outside is None else "single" if single else "outside",
             "concealed": outside or (concealed[0] if concealed else ""),
@@ -100,7 +99,7 @@ def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any
             "seconds": time.process_time() - began[0],
             "wall_s": time.perf_counter() - began[1],
         }
-    )  # type: ignore[return-value]
+    )
 
 
 def port_right(case: dict[str, Any]) -> bool | None:
@@ -142,11 +141,7 @@ def _summary(cases: list[dict[str, Any]]) -> str:
     lawful = [c for c in cases if c["concealed"] in PORTS_OF]
     written_in = [c for c in lawful if c["invented"] and c["gap_closed"] is not None]
     for kind in ("single", "outside"):
-        closed = [
-            c["gap_closed"]
-            for c in lawful
-            if c["kind"] == kind and c["invented"] and c["gap_closed"] is not None
-        ]
+        closed = [case["gap_closed"] for case in written_in if case["kind"] == kind]
         written = sum(bool(c["invented"]) for c in lawful if c["kind"] == kind)
         of = sum(c["kind"] == kind for c in lawful)
         middle = f"{np.median(closed):.2f}" if closed else "-"
@@ -183,12 +178,16 @@ def main() -> None:
     with ProcessPoolExecutor(given.workers) as pool:
         jobs = {pool.submit(look_at, given.cases / "cases" / name, labels[name]): name for name in waiting}
         for job in as_completed(jobs):
+            if job.exception() is not None:
+                print(f"{jobs[job]}: no verdict: {job.exception()}", flush=True)
+                continue
             write_whole(given.out / f"{jobs[job]}.json", json.dumps(job.result(), indent=1) + "\n")
             print(
                 f"{jobs[job]}: {job.result()['concealed'] or 'nothing'} -> {job.result()['typeset']}",
                 flush=True,
             )
-    found = {name: json.loads((given.out / f"{name}.json").read_text()) for name in labels}
+    kept = {name: given.out / f"{name}.json" for name in labels}
+    found = {name: json.loads(file.read_text()) for name, file in kept.items() if file.exists()}
     write_whole(given.out / "table.md", table(found))
     print(table(found))
 

@@ -56,7 +56,8 @@ def sentences(verdict: Verdict) -> list[str]:
 def title(verdict: Verdict) -> str:
     """Say in a sentence what is missing; where the proof fails, that first."""
     if verdict.judgement.failed:
-        return f"{FAILS} What was found, and is not to be relied on: {_names(verdict)}."
+        found = " and ".join([*([_names(verdict)] if verdict.effects else []), *_laws(verdict)])
+        return f"{FAILS} What was found, and is not to be relied on: {found}."
     return _headline(verdict)
 
 
@@ -87,8 +88,13 @@ def _names(verdict: Verdict) -> str:
     return " and ".join(named) if len(named) < MOST_NAMED else f"{', '.join(named[:-1])}, and {named[-1]}"
 
 
+def _laws(verdict: Verdict) -> list[str]:
+    """Name the laws that were written, each once."""
+    return list(dict.fromkeys(law.looks_like for law in verdict.invented))
+
+
 def _headline(verdict: Verdict) -> str:
-    names, laws = _names(verdict), " and ".join(law.looks_like for law in verdict.invented)
+    names, laws = _names(verdict), " and ".join(_laws(verdict))
     return {
         "nothing": _nothing(verdict),
         "missing": f"Missing in the simulation: {names}.",

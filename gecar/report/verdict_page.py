@@ -22,7 +22,8 @@ from gecar.reality.compare.side_by_side import (
     side_by_side,
     typical,
 )
-from gecar.reality.verdict import Found, Minor, Verdict
+from gecar.reality.verdict import Found, Invented, Minor, Verdict
+from gecar.report.law import law_sentence
 from gecar.report.units import amount
 from gecar.report.verdict import (
     CHANNEL_WORDS,
@@ -93,7 +94,7 @@ def the_number(verdict: Verdict, shown: Sequence[Beside]) -> str:
     where = (
         f"<span class='soft'>{_text(run.name)}, not used for the fit{_turned(run, measure, verdict)}</span>"
     )
-    if not verdict.effects:
+    if not verdict.found:
         return f"Off by <span class='was'>{was}</span>{_KINDS[measure]} {when}; {noise_words}. {where}"
     return (
         f"Off by <span class='was'>{was}</span>{_KINDS[measure]} {when}; now "
@@ -114,7 +115,7 @@ def _turned(run: Beside, measure: str, verdict: Verdict) -> str:
         unit = "mm"
     else:
         return ""
-    words = f"{amount(was, unit)}" if not verdict.effects else f"{amount(was, unit)}, now {amount(now, unit)}"
+    words = f"{amount(was, unit)}" if not verdict.found else f"{amount(was, unit)}, now {amount(now, unit)}"
     return f"; {'heading' if unit == 'deg' else 'rolled'}: {words}"
 
 
@@ -154,9 +155,10 @@ def _capital(words: str) -> str:
 
 def _found(verdict: Verdict) -> str:
     parts = []
-    if verdict.effects:
-        parts.append("<h2>What was found</h2>" + "".join(_card(found, verdict) for found in verdict.effects))
-    if verdict.verdict.endswith("unexplained"):
+    if verdict.found:
+        cards = [_card(found, verdict) for found in verdict.effects] + [_law(law) for law in verdict.invented]
+        parts.append("<h2>What was found</h2>" + "".join(cards))
+    if verdict.residual.material:
         parts.append(f"<h2>What is left</h2><p>{_text(unexplained(verdict))}</p>")
     if verdict.minor:
         rows = "".join(f"<li>{_one(minor, verdict)}</li>" for minor in verdict.minor)
@@ -172,6 +174,15 @@ def _card(found: Found, verdict: Verdict) -> str:
         doubt = f"<p>These recordings can not tell it from: {_text(others)}.</p>"
     return (
         f"<h3>{_text(_capital(BY_ID[found.id].title))}</h3><p>{_one(found, verdict, named=False)}</p>{doubt}"
+    )
+
+
+def _law(law: Invented) -> str:
+    """Return a law that was written: its name, its formula, and in words what is known of it."""
+    words = law_sentence(law).partition(": ")[2].removeprefix(law.term.typeset).lstrip(" ;.")
+    return (
+        f"<h3>{_text(_capital(law.looks_like))}</h3><p><strong>{_text(law.term.typeset)}</strong><br>"
+        f"<span class='soft'>{_text(words)}</span></p>"
     )
 
 

@@ -20,6 +20,7 @@ BEYOND = 0.3  # of the range: how far the curve goes on where no recording went
 POINTS = 400
 DRAWS = 200  # of constants within their intervals, for the band
 _VARIABLES = {variable.id: variable for variable in VARIABLES}
+_NOWHERE = {"time": np.zeros(())}
 _ANGLES = ("angle", "other_angle", "heading")
 
 
@@ -43,9 +44,9 @@ def _draw_law(axes: Axes, law: Invented) -> None:
     axes.set(title=term.typeset, ylabel=f"{port.title}{unit}")
     axes.title.set_fontsize(9)
     if name is None:
-        value = float(term.value({"time": np.zeros(1)})[0])
+        value = float(term.value(_NOWHERE))
         ends = [term.with_constants(_ends(law, k)) for k in (0, 1)]
-        low, high = sorted(float(end.value({"time": np.zeros(1)})[0]) for end in ends)
+        low, high = sorted(float(end.value(_NOWHERE)) for end in ends)
         axes.axhspan(low, high, color=BLUE, alpha=0.18, linewidth=0)
         axes.axhline(value, color=BLUE)
         axes.axhline(0.0, color=INK, linewidth=0.6)

@@ -76,7 +76,7 @@ def replays_json(verdict: Verdict, shown: Sequence[Beside]) -> dict[str, Any]:
         "robot": robot_json(verdict.robot),
         "wheel_mm": round(1e3 * verdict.robot.body.wheel_radius, 2),
         "measure": measure,
-        "changed": bool(verdict.effects),
+        "changed": verdict.found,
         "marks": _marks(verdict) if places else [],
         "recordings": [_recording(verdict, each, measure) for each in kept],
     }

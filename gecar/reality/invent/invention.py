@@ -104,7 +104,7 @@ def invent(
         tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in proved.terms)}")
         if not written.explained.unexplained:
             break
-    return replace(written, invented=_with_constants_of(written, explained))
+    return replace(written, invented=_with_constants_of(written, explained)) if written.terms else written
 
 
 def _ports(problem: Problem) -> list[str]:

@@ -133,7 +133,7 @@ def _once_per_turn(term: Term) -> str:
 def _stored(term: Term) -> str:
     if not term.store:
         return ""
-    fills = "use" if re.search("command|current", term.store) else "motion"
+    fills = "use" if re.search("command|current|draw", term.store) else "motion"
     what = "heat" if term.port != "supply_voltage" else "a battery that tires"
     return f"grows over the first {2.0 * term.store_s:.0f} s of {fills} and stays: {what}"
 

@@ -1,0 +1,202 @@
+"""Laws that are written: found again where the simulated robot has one, and none where there is only noise.
+
+The proof that counts is on recordings of other worlds: ``python -m benchmarks.invention``.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from concealing import EV3, recorded
+
+from gecar.errors import InputError
+from gecar.language.grammar import parse_grammar
+from gecar.plots.reality.law import laws_figure
+from gecar.plots.style import is_whole
+from gecar.reality.discovery import discover
+from gecar.reality.invent.looks import looks_like
+from gecar.reality.invent.sentences import (
+    complexity,
+    joined,
+    key,
+    physics_grammar,
+    pieces,
+    read_sentence,
+    single_laws,
+)
+from gecar.reality.recordings.recording import Case
+from gecar.report.verdict import sentences
+from gecar.report.verdict_page import verdict_html
+from gecar.world.effects import CATALOGUE
+from gecar.world.ports import PORTS
+from gecar.world.robot import read_robot, write_robot
+from gecar.world.terms import Term
+
+FEW = parse_grammar(
+    """
+    <term> ::= supply_voltage: <s> | motor_torque: <w> | force_x and force_y: <p> | yaw_moment: <y> | pose_x: <p>
+    <s> ::= c * 1 | c * draw | c * time
+    <w> ::= c * <f> | c * <f> + c * <f>
+    <f> ::= speed | speed * abs(speed) | sign(speed) | command | sin(2 * angle)
+    <p> ::= c * 1 | c * x | c * y
+    <y> ::= c * turn_rate | c * 1
+    """
+)
+UNRELATED = [effect for effect in CATALOGUE if effect.id in ("clock_skew", "pose_delay", "start_latency")]
+
+
+def robot_with(*tables):
+    return EV3.with_terms([Term(**table) for table in tables])
+
+
+@cache
+def verdict_on(*tables, invents=False, language=FEW, seeds=5):
+    robot = robot_with(*map(dict, tables))
+    runs = tuple(recorded(robot, seed) for seed in range(seeds))
+    return discover(Case("made", runs), catalogue=UNRELATED, language=language, invents=invents)
+
+
+def frozen(**table):
+    return tuple(table.items())
+
+
+SAG = frozen(port="supply_voltage", law="-c1 * draw", c1=1.5)
+DRAG = frozen(port="motor_torque", law="c1 * speed * abs(speed)", c1=-3e-4)
+TILT = frozen(port="force_x", law="c1", c1=0.2), frozen(port="force_y", law="c1", c1=-0.15)
+CAMERA = frozen(port="pose_x", law="c1 * x", c1=0.03)
+
+
+@pytest.mark.parametrize("hidden", [(SAG,), (DRAG,), TILT, (CAMERA,)], ids=["sag", "drag", "tilt", "camera"])
+def test_a_hidden_law_is_written_anew_and_closes_the_gap(hidden):
+    verdict = verdict_on(*hidden)
+    assert verdict.verdict == "invented"
+    assert verdict.effects == ()
+    wanted = {dict(table)["port"]: dict(table) for table in hidden}
+    assert {law.term.port for law in verdict.invented} == set(wanted)
+    for law in verdict.invented:
+        table = wanted[law.term.port]
+        true = -table["c1"] if table["law"].startswith("-") else table["c1"]
+        found = law.parameters["c1"]
+        assert found.low < found.value < found.high
+        assert found.value == pytest.approx(true, rel=0.05)
+        assert set(law.term.parsed.variables) == set(Term(**table).parsed.variables)
+        assert law.left_out_gain > law.null_95
+        assert law.holdout_gain > 0.0
+    assert verdict.judgement.gap_closed > 0.9
+    assert not set(verdict.fitted_on) & set(verdict.judgement.recordings)
+
+
+def test_the_robot_found_carries_the_law(tmp_path):
+    verdict = verdict_on(SAG)
+    write_robot(verdict.robot, tmp_path / "robot.toml")
+    again = read_robot(tmp_path / "robot.toml")
+    assert again.term == tuple(law.term for law in verdict.invented)
+    runs = tuple(recorded(robot_with(dict(SAG)), seed) for seed in range(5))
+    anew = discover(Case("made", runs), robot=again, catalogue=UNRELATED, language=FEW)
+    assert anew.verdict == "nothing"
+
+
+def test_a_law_is_told_in_words_numbers_and_pictures():
+    verdict = verdict_on(SAG)
+    assert (
+        sentences(verdict)[0] == "Missing in the simulation, and in no list: a battery that sags under load."
+    )
+    (table,) = json.loads(json.dumps(verdict.as_json()["invented"]))
+    assert (table["port"], table["variables"], table["unit"]) == ("supply_voltage", ["draw"], "V")
+    assert table["evidence"]["p"] < 0.05
+    low, high = table["range"]["draw"]
+    assert low == 0.0
+    assert high > 1.0
+    assert "supply_voltage = -1.5" in verdict_html(verdict, {})
+    for each in (verdict, verdict_on(*TILT), verdict_on(DRAG)):
+        assert is_whole(laws_figure(each))
+
+
+def test_without_a_language_nothing_is_written():
+    verdict = verdict_on(SAG, language=None)
+    assert verdict.verdict == "unexplained"
+    assert verdict.invented == ()
+
+
+def test_nothing_is_written_where_nothing_is_missing():
+    assert verdict_on(invents=True).verdict == "nothing"
+
+
+def test_noise_is_no_law():
+    """A push that is another in every recording, as wind is."""
+    runs = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        gust = {"port": "force_ahead", "law": "a * sin(w * time + p)", "a": 0.5}
+        gust |= {"w": rng.uniform(0.5, 3.0), "p": rng.uniform(0.0, 6.0)}
+        runs.append(recorded(robot_with(gust), seed))
+    verdict = discover(Case("gusts", tuple(runs)), catalogue=UNRELATED, language=FEW, invents=True)
+    assert verdict.invented == ()
+
+
+def test_every_single_law_of_the_shipped_language_is_one():
+    laws = single_laws(physics_grammar())
+    assert len(laws) > 1000
+    assert {term.port for each in laws for term in each} == {port.id for port in PORTS}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<t> ::= motor_torque: c * sped", "found 'sped'"),
+        ("<t> ::= engine: c", "found port 'engine'"),
+        ("<t> ::= pose_x: c * speed", "found 'speed'"),
+        ("<t> ::= motor_torque: c; shop: 3", "found 'shop'"),
+    ],
+)
+def test_a_language_that_is_none_of_physics_is_refused(tmp_path, text, words):
+    path = tmp_path / "mine.bnf"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words) as raised:
+        physics_grammar(str(path))
+    assert "mine.bnf" in str(raised.value)
+
+
+def test_sums_are_taken_apart_and_put_together():
+    (law,) = read_sentence("motor_torque: c * speed + c * sin(2 * angle) + c * tanh(speed / 0.3)")
+    parts = pieces(law)
+    assert [part.law for part in parts] == ["c1 * speed", "c2 * sin(k1 * angle)", "c3 * tanh(speed / k2)"]
+    again = joined(
+        [part.with_constants({name: 5.0 for name in part.constants if name[0] == "c"}) for part in parts]
+    )
+    assert again.constants == {"c1": 5.0, "c2": 5.0, "c3": 5.0, "k1": 2.0, "k2": 0.3}
+    assert key((again,)) == key((law,)) == key((joined(parts[::-1]),))
+    assert key((law,)) != key(
+        read_sentence("motor_torque: c * speed + c * sin(3 * angle) + c * tanh(speed / 0.3)")
+    )
+    assert complexity((law,)) > complexity(read_sentence("motor_torque: c * speed"))
+    assert [t.law for t in read_sentence("force_x and force_y: c * x")] == ["c1 * x", "c1 * y"]
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"port": "motor_torque", "law": "c1 * speed * abs(speed)", "c1": -1e-4}, "drag growing with the square"),
+        ({"port": "force_toward", "law": "c1 * distance", "c1": 0.3, "at_x": 1.21, "at_y": 0.58},
+         "a pull toward (1.21, 0.58) growing with distance: a spring"),
+        ({"port": "rolling_radius", "law": "c1 * sin(k1 * angle) + c2 * cos(k2 * angle)", "c1": 0.1, "c2": 0.1,
+          "k1": 1.0, "k2": 1.0}, "a wheel off its centre by 4.0 mm"),
+        ({"port": "motor_torque", "law": "c1 * store * command", "c1": -0.1, "store": "draw", "store_s": 15.0},
+         "grows over the first 30 s of use and stays: heat"),
+        ({"port": "yaw_moment", "law": "c1 * heading * y", "c1": 0.1}, "depends on the heading and the place along y"),
+    ],
+)  # fmt: skip
+def test_what_a_law_looks_like(table, words):
+    assert words in looks_like(Term(**table))
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [("--without=gravity", "an effect of the catalogue"), ("--physics=none.bnf", "none.bnf")],
+)
+def test_the_command_line_names_what_it_does_not_know(gecar, tmp_path, option, words):
+    (tmp_path / "case").mkdir()
+    assert words in gecar.error("discover", tmp_path / "case", option)
