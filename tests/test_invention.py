@@ -66,10 +66,10 @@ def frozen(**table):
 SAG = frozen(port="supply_voltage", law="-c1 * draw", c1=1.5)
 DRAG = frozen(port="motor_torque", law="c1 * speed * abs(speed)", c1=-3e-4)
 TILT = frozen(port="force_x", law="c1", c1=0.2), frozen(port="force_y", law="c1", c1=-0.15)
-CAMERA = frozen(port="pose_x", law="c1 * x", c1=0.03)
+SCRUB = frozen(port="yaw_moment", law="c1 * turn_rate", c1=-0.01)
 
 
-@pytest.mark.parametrize("hidden", [(SAG,), (DRAG,), TILT, (CAMERA,)], ids=["sag", "drag", "tilt", "camera"])
+@pytest.mark.parametrize("hidden", [(SAG,), (DRAG,), TILT, (SCRUB,)], ids=["sag", "drag", "tilt", "scrub"])
 def test_a_hidden_law_is_written_anew_and_closes_the_gap(hidden):
     verdict = verdict_on(*hidden)
     assert verdict.verdict == "invented"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from gecar.compiled import numbers
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID, DEG, Parameter
 from gecar.world.robot import Robot
@@ -129,7 +130,7 @@ def quantities(effect_id: str, parameters: Mapping[str, Interval], robot: Robot)
         As it was known.
     """
     physics = robot.physics[0]
-    constants = {name: float(physics[name]) for name in physics.dtype.names}
+    constants = {name: float(physics[name]) for name in numbers(physics.dtype)}
     out = []
     for parameter in BY_ID[effect_id].parameters:
         if parameter.field in _SHAPES or parameter.label not in parameters:
@@ -159,7 +160,7 @@ def _scaled(reading: Reading, value: float, constants: Mapping[str, float]) -> R
 def smallest(parameter: Parameter, size: float, robot: Robot) -> str:
     """Say the smallest size of an effect that would have been seen: a change from what is known."""
     physics = robot.physics[0]
-    constants = {name: float(physics[name]) for name in physics.dtype.names}
+    constants = {name: float(physics[name]) for name in numbers(physics.dtype)}
     known = constants[parameter.field]
     reading = _scaled(_READINGS[parameter.field], size * parameter.si, constants)
     if math.isinf(parameter.neutral or 0.0):

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gecar.plots.style import BLUE, FAINT, INK, headline, look, new_figure
+from gecar.plots.style import BLUE, FAINT, INK, SOFT, headline, look, new_figure
 from gecar.reality.verdict import Invented, Verdict
 from gecar.world.ports import BY_PORT, VARIABLE, VARIABLES
 from gecar.world.terms import Term
@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 
 BEYOND = 0.3  # of the range: how far the curve goes on where no recording went
 POINTS = 400
+CURVE_IN, ALWAYS_IN = 2.7, 1.2
 DRAWS = 200  # of constants within their intervals, for the band
 _VARIABLES = {variable.id: variable for variable in VARIABLES}
 _NOWHERE = {"time": np.zeros(())}
@@ -25,50 +26,58 @@ _ANGLES = ("angle", "other_angle", "heading")
 
 
 def laws_figure(verdict: Verdict) -> Figure:
-    """Draw every law a verdict holds, each against the variable it depends on most."""
+    """Draw every law a verdict holds: over the variable it depends on most, or as one value with its interval."""
     laws = verdict.invented
-    figure = new_figure(8.0, 1.2 + 2.7 * len(laws))
+    telling = [_telling(law) for law in laws]
+    heights = [ALWAYS_IN if name is None else CURVE_IN for name in telling]
+    figure = new_figure(8.0, 1.0 + sum(heights))
     with look():
-        for axes, law in zip(
-            np.atleast_1d(figure.subplots(len(laws), 1, squeeze=False)[:, 0]), laws, strict=True
-        ):
-            _draw_law(axes, law)
-        headline(figure, "The law that was written", "95 % band; grey: no recording went there")
+        panels = figure.subplots(len(laws), 1, squeeze=False, height_ratios=heights)[:, 0]
+        for axes, law, name in zip(panels, laws, telling, strict=True):
+            axes.set_title(law.term.typeset, fontsize=9)
+            if name is None:
+                _draw_value(axes, law)
+            else:
+                _draw_curve(axes, law, name)
+        drawn = "95 % band; grey: no recording went there" if any(telling) else "95 % interval"
+        headline(figure, "The law that was written", drawn)
     return figure
 
 
-def _draw_law(axes: Axes, law: Invented) -> None:
-    term, port = law.term, BY_PORT[law.term.port]
-    name = _telling(law)
-    unit = "" if port.unit == "-" else f" [{port.unit}]"
-    axes.set(title=term.typeset, ylabel=f"{port.title}{unit}")
-    axes.title.set_fontsize(9)
-    if name is None:
-        value = float(term.value(_NOWHERE))
-        ends = [term.with_constants(_ends(law, k)) for k in (0, 1)]
-        low, high = sorted(float(end.value(_NOWHERE)) for end in ends)
-        axes.axhspan(low, high, color=BLUE, alpha=0.18, linewidth=0)
-        axes.axhline(value, color=BLUE)
-        axes.axhline(0.0, color=INK, linewidth=0.6)
-        axes.set(xticks=[], xlabel="always the same")
-        return
-    low, high = (0.0, 2.0 * np.pi) if name in _ANGLES else law.range[name]
+def _draw_value(axes: Axes, law: Invented) -> None:
+    """Draw a law that is always the same."""
+    value = float(law.term.value(_NOWHERE))
+    low, high = sorted(float(law.term.with_constants(_ends(law, k)).value(_NOWHERE)) for k in (0, 1))
+    axes.errorbar([value], [0.0], xerr=[[value - low], [high - value]], fmt="o", color=BLUE, capsize=4)
+    axes.axvline(0.0, color=INK, linewidth=0.6)
+    axes.set(yticks=[], ylim=(-1.0, 1.0), xlabel=f"{_what(law)}, always the same")
+    axes.margins(x=0.1)
+
+
+def _draw_curve(axes: Axes, law: Invented, name: str) -> None:
+    """Draw a law over a variable."""
+    low, high = _ends_of(law, name)
     beyond = 0.0 if name in _ANGLES else BEYOND * (high - low)
     at = np.linspace(low - beyond, high + beyond, POINTS)
     inside = (at >= low) & (at <= high)
-    curve = _curve(law, term, name, at)
+    curve = _curve(law, law.term, name, at)
     rng = np.random.default_rng(0)
     drawn = np.array([_curve(law, _drawn(law, rng), name, at) for _ in range(DRAWS)])
     band = np.quantile(drawn, (0.025, 0.975), axis=0)
     axes.fill_between(at[inside], band[0, inside], band[1, inside], color=BLUE, alpha=0.18, linewidth=0)
     axes.axvspan(at[0], low, color=FAINT, alpha=0.6, linewidth=0)
     axes.axvspan(high, at[-1], color=FAINT, alpha=0.6, linewidth=0)
-    axes.plot(at, curve, color=FAINT, linestyle="--")
+    axes.plot(at, curve, color=SOFT, linestyle="--", linewidth=1.0)
     axes.plot(at[inside], curve[inside], color=BLUE)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     variable = _VARIABLES[name]
     shown = "" if variable.unit == "-" else f" [{variable.unit}]"
-    axes.set(xlim=(at[0], at[-1]), xlabel=f"{variable.title}{shown}")
+    axes.set(xlim=(at[0], at[-1]), xlabel=f"{variable.title}{shown}", ylabel=_what(law).replace(" [", "\n["))
+
+
+def _what(law: Invented) -> str:
+    port = BY_PORT[law.term.port]
+    return port.title + ("" if port.unit == "-" else f" [{port.unit}]")
 
 
 def _telling(law: Invented) -> str | None:
