@@ -21,7 +21,7 @@ from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.problem import Problem as EvolvedProblem
 from gecar.evolution.settings import EvolutionSettings
 from gecar.language.grammar import Grammar
-from gecar.language.mapping import Mapped, Mapper
+from gecar.language.mapping import Derivation, Mapper
 from gecar.reality.fitting.model import Model
 from gecar.reality.invent.free_terms import FreeTerms, usual_size
 from gecar.reality.invent.sentences import (
@@ -57,7 +57,6 @@ EVOLUTION = EvolutionSettings(
 FINALISTS = 9
 ROUNDS = 8
 OWN_SHARE = 1e-4  # of a column's square that the model's own parameters do not hold; less is none of its own
-MIDDLE = 1e3  # merit of a law that neither gains nor loses: an evolution's merits are above 0
 
 
 @dataclass(frozen=True)
@@ -288,26 +287,26 @@ def _sum(parts: Sequence[Term]) -> Term | None:
 class _Evolved(EvolvedProblem[Laws]):
     """Laws as what an evolution evolves: the sentences of a grammar."""
 
-    def read(self, mapped: Mapped, i: int) -> Laws | None:
-        """Return genome i's laws; None where its sentence is none."""
+    def read(self, derivation: Derivation) -> Laws | None:
+        """Return the laws that were derived; None where the sentence is none."""
         try:
-            return read_sentence(mapped.text(i)) if mapped.valid[i] else None
+            return read_sentence(derivation.text)
         except ValueError:
             return None
 
-    def meaning(self, program: Laws) -> bytes:
+    def meaning(self, program: Laws, derivation: Derivation) -> bytes:  # noqa: ARG002
         """Return the laws as bytes."""
         return key(program).encode()
 
 
 def _evolved(library: Library, grammar: Grammar, seed: int) -> list[Laws]:
     """Return the best laws of an evolution."""
-    evolution = Evolution(EVOLUTION, Mapper(grammar), _Evolved(), seed=seed)
+    evolution = Evolution(Mapper(grammar), _Evolved(), EVOLUTION, seed)
     found: dict[str, tuple[float, Laws]] = {}
     while not evolution.finished:
         asked = [candidate.program for candidate in evolution.ask()]
         library.look_up([part for laws in asked for part in parts_of(laws)])
         losses = [_loss(library, laws) for laws in asked]
         found |= {key(laws): (loss, laws) for loss, laws in zip(losses, asked, strict=True)}
-        evolution.tell([MIDDLE * (1.0 + min(loss / max(library.model.cost, 1.0), 1.0)) for loss in losses])
+        evolution.tell(losses)
     return [laws for _, laws in sorted(found.values(), key=lambda pair: pair[0])[:KEPT_LAWS]]
