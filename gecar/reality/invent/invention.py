@@ -26,6 +26,7 @@ from gecar.reality.invent.proof import largest_gains, left_out_gains
 from gecar.reality.invent.search import Law, Library, search
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
+from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
@@ -194,14 +195,20 @@ def _explained_with(
 
 
 def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) -> float | None:
-    """Return what a law gains on recordings set aside; None where they do not ask for it, or part as far with it."""
+    """Return what a law gains on recordings set aside; None where they do not ask for it, or part as far with it.
+
+    Both over a metre and over whole drives, open loop, as the verdict is judged.
+    """
     if not held.recordings:
         return 0.0
     physics = [e.problem.with_small_changes(e.taken) for e in (before, after)]
     without, having = (held.errors(p) for p in physics)
     asked = share_asked_for(held.index, without, having)
     was, now = (before.problem.material.times(before.problem.sizes.of(held).left(p)) for p in physics)
-    return cost(without) - cost(having) if asked.margin > 0.0 and now < HELPS * was else None
+    robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
+    whole = judge(*(Contender(robot, held) for robot in robots)).values()
+    better = sum(m.after for m in whole) < sum(m.before for m in whole)
+    return cost(without) - cost(having) if asked.margin > 0.0 and now < HELPS * was and better else None
 
 
 def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
