@@ -117,7 +117,7 @@ def test_a_bench_needs_no_camera() -> None:
 def test_the_verdicts_json_keeps_the_contract() -> None:
     table = verdict_on("actuation_delay", "time_s", 0.03).as_json()
     assert set(table) == {
-        "verdict", "effects", "minor", "limits", "located", "holdout", "residual", "next_recording"
+        "verdict", "effects", "minor", "invented", "limits", "located", "holdout", "residual", "next_recording"
     }  # fmt: skip
     assert set(table["residual"]) == {"white", "p", "formula", "material", "size"}
     assert set(table["residual"]["size"]) >= {"mm", "deg", "arrival_s"}
@@ -201,7 +201,7 @@ def test_a_formula_that_harms_a_channel_says_so() -> None:
     harmed = replace(
         verdict, verdict="unexplained", residual=Residual(False, 0.01, Size(), True, "x", described)
     )
-    assert "x_m 0.1000 to 0.0500, y_m 0.1000 to 0.2000 (worse)" in str(harmed)
+    assert "x_m 0.1000 to 0.0500, y_m 0.1000 to 0.2000 (worse)" in " ".join(sentences(harmed))
 
 
 def test_every_term_of_a_formula_has_one_name() -> None:

@@ -42,7 +42,7 @@ def sentences(verdict: Verdict) -> list[str]:
         out.append(f"Visible, and too small to matter; it could be: {named}.")
     if verdict.found and not verdict.residual.material and not verdict.judgement.failed:
         out.append(f"What is left {does(verdict.residual.size, verdict)}, which does not matter.")
-    if verdict.residual.material:
+    if verdict.residual.material or verdict.verdict.endswith("unexplained"):
         out.append(unexplained(verdict))
     if verdict.located:
         out.append(

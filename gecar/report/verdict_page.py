@@ -158,7 +158,7 @@ def _found(verdict: Verdict) -> str:
     if verdict.found:
         cards = [_card(found, verdict) for found in verdict.effects] + [_law(law) for law in verdict.invented]
         parts.append("<h2>What was found</h2>" + "".join(cards))
-    if verdict.residual.material:
+    if verdict.residual.material or verdict.verdict.endswith("unexplained"):
         parts.append(f"<h2>What is left</h2><p>{_text(unexplained(verdict))}</p>")
     if verdict.minor:
         rows = "".join(f"<li>{_one(minor, verdict)}</li>" for minor in verdict.minor)
