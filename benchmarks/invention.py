@@ -129,7 +129,7 @@ def table(cases: dict[str, dict[str, Any]]) -> str:
     for name, case in sorted(cases.items(), key=lambda item: (item[1]["kind"], item[1]["concealed"])):
         closed = "-" if case["gap_closed"] is None else f"{case['gap_closed']:.2f}"
         port = {None: "-", True: "yes", False: "no"}[port_right(case)]
-        laws = "; ".join(f"`{words}`" for words in case["typeset"]) or "-"
+        laws = "; ".join(f"`{words}`" for words in case["typeset"]).replace("|", "\\|") or "-"
         named = ", ".join(case["effects"]) or "-"
         what = case["concealed"] or "nothing"
         rows.append([name, what, case["verdict"], named, laws, closed, port, f"{case['seconds']:.0f}"])
