@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-DATA = {".toml", ".html", ".bnf", ".png", ".typed"}
+DATA = {".toml", ".html", ".bnf", ".png", ".typed", ".pyi"}
 
 
 @pytest.fixture(scope="module")

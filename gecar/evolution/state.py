@@ -9,6 +9,7 @@ from typing import Any, Generic
 import numpy as np
 import numpy.typing as npt
 
+from gecar.displayed import Displayed
 from gecar.evolution.problem import P
 from gecar.evolution.scores import Floats, Scores
 
@@ -27,7 +28,7 @@ class Candidate(Generic[P]):
 
 
 @dataclass(frozen=True)
-class Best(Generic[P]):
+class Best(Displayed, Generic[P]):
     """The best individual of a run so far.
 
     Attributes

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from gecar.displayed import Displayed
 from gecar.reality.materiality import Size
 from gecar.world.robot import Robot
 from gecar.world.terms import Term
@@ -243,7 +244,7 @@ class NextRecording:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Displayed):
     """What `gecar.reality.discovery.discover` found: `print` it, `plot` it, or let a notebook show it."""
 
     case: str

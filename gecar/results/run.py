@@ -200,7 +200,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
 
     try:
         if not evolution.finished:
-            _run(task, evolution, saved)
+            search(task, evolution, saved)
     except KeyboardInterrupt:
         saver.leave()
         raise
@@ -215,7 +215,8 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     return folder.write_result(evolution, measured(task, evolution))
 
 
-def _run(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
+def search(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
+    """Run an evolution to its last generation on the task's executor; nothing is written."""
     config = task.config
     with Batches(task.evaluator, partial(open_executor, *task.place), side_by_side(*task.place)) as batches:
         rehearse(config.search, task.mapper, task.problem)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gecar.displayed import Displayed
 from gecar.errors import expected
 from gecar.files import write_whole
 from gecar.reality.recordings.columns import COLUMNS, Series
@@ -25,7 +26,7 @@ LONGEST_S = 36_000.0  # a replay simulates every millisecond between two rows, h
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Displayed):
     """One run. Every series has shape (rows,); NaN where a column has no sample.
 
     Attributes

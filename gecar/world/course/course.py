@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 
+from gecar.displayed import Displayed
 from gecar.errors import InputError, expected, one_of
 from gecar.files import is_file, read_text, shipped
 from gecar.world.course import line, raster
@@ -32,7 +33,7 @@ _LARGEST_FILE = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Course(Displayed):
     """A course; made by `load_course`, `parse_course` or `course_from`.
 
     Coordinates: metres, x right and y up from the field's lower left corner. Tiles are numbered

@@ -1,0 +1,348 @@
+"""gecar from Python: evolve, simulate and discover as one call each, with names, files or objects.
+
+They stand at the top: ``gecar.evolve``, ``gecar.simulate``, ``gecar.discover``. A notebook shows what they return.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gecar.displayed import Displayed
+from gecar.errors import InputError, expected
+from gecar.evolution.ask_tell import Evolution, rehearse, run
+from gecar.evolution.history import Generation
+from gecar.evolution.state import Best, Candidate
+from gecar.language.grammar import Grammar
+from gecar.language.mapping import Mapper
+from gecar.language.program import Program, parse_program, read_program
+from gecar.language.robot_language import check_robot_language
+from gecar.reality.discovery import discover as find_missing
+from gecar.reality.materiality import DEFAULT, Material
+from gecar.reality.recordings.recording import Case, Recording, read_case
+from gecar.reality.verdict import Verdict
+from gecar.results.arrival import arrives
+from gecar.results.config import Config, configure
+from gecar.results.run import Task, choose, finish, load_task, search, start
+from gecar.search.own_fitness import Fitness, FitnessEvaluator
+from gecar.search.programs import noise_seed
+from gecar.search.settings import DEFAULT_PRESET, PRESETS, Settings
+from gecar.world.course.course import Course, load_course
+from gecar.world.robot import Robot, load_robot
+from gecar.world.rollout import Drive, Noise, Outcome, World
+from gecar.world.rollout import simulate as drive_program
+
+Tell = Callable[[Generation], None]
+
+
+@dataclass(frozen=True)
+class Simulation(Displayed):
+    """A program's drive in the simulation.
+
+    Attributes
+    ----------
+    world
+        Robot, course, and settings.
+    program
+        What drove.
+    drive
+        What came of it, with its trace.
+    """
+
+    world: World
+    program: Program
+    drive: Drive
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the drive ended."""
+        return self.drive.outcome
+
+    @property
+    def time_s(self) -> float:
+        """When it ended [s]; with `Outcome.GOAL` the time to GOAL."""
+        return self.drive.time_s
+
+    @cached_property
+    def arrives(self) -> Mapping[str, Any]:
+        """How the program arrives in 200 drives under drawn conditions; see `gecar.results.arrival.arrives`."""
+        return arrives(self.world, self.program, 1)
+
+
+@dataclass(frozen=True)
+class Run(Displayed):
+    """A finished evolution.
+
+    Attributes
+    ----------
+    best
+        The best individual: genome, score, generation, program.
+    history
+        A record for each generation.
+    world
+        Robot, course, and settings of the simulation.
+    seed
+        The run's.
+    folder
+        Where its files are, or None.
+    """
+
+    best: Best[Program]
+    history: Sequence[Generation]
+    world: World
+    seed: int
+    folder: Path | None = None
+
+    @property
+    def program(self) -> Program:
+        """The best program.
+
+        Raises
+        ------
+        InputError
+            If no genome mapped to a program.
+        """
+        if self.best.program is None:
+            raise InputError(
+                "run: found no genome that maps to a program, expected one; raise codons or wraps"
+            )
+        return self.best.program
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The best program's drive, as the run scored it."""
+        seed = noise_seed(self.seed, self.program)
+        return Simulation(
+            self.world, self.program, drive_program(self.world, self.program.opcodes, seed, trace=True)
+        )
+
+
+def evolve(
+    course: str | Path | Course = "paper",
+    grammar: str | Path | Grammar = "paper",
+    fitness: Fitness | None = None,
+    settings: str | Mapping[str, Any] | Settings = DEFAULT_PRESET,
+    *,
+    robot: str | Path | Robot = "ev3",
+    seed: int = 1,
+    workers: int | None = None,
+    noise_pct: float = 0.0,
+    motor_noise_pct: float = 0.0,
+    time_limit_s: float = 60.0,
+    out: str | Path | None = None,
+    tell: Tell = lambda generation: None,  # noqa: ARG005
+) -> Run:
+    """Evolve a program that drives a robot round a course.
+
+    Parameters
+    ----------
+    course, grammar, robot
+        Names, files, or objects.
+    fitness
+        What a drive is worth, by default its time to GOAL (eq. 1): a function of a `gecar.world.rollout.Drive` with
+        its trace. Less is better; 0 or more; 10,000 or more, or nan, is a drive that failed. Drives are then simulated
+        one at a time in this thread, about 2 ms each.
+    settings
+        A preset's name; or what differs from preset ``better``, by name, as in config.toml; or `Settings`.
+    seed
+        Random seed.
+    workers
+        Number of threads; default: one a core. It does not change the result.
+    noise_pct, motor_noise_pct
+        Noise of each sensor reading [%], and of each command's strength [% of it].
+    time_limit_s
+        When a drive without GOAL ends [s].
+    out
+        A new folder for what ``gecar evolve`` writes; by default nothing is written. It needs names or files, and
+        eq. 1, for the run has to go on from what the folder says.
+    tell
+        Called with each generation's record.
+
+    Raises
+    ------
+    InputError
+        If there is no such course, grammar, robot, preset or setting, a value is out of bounds, or the folder exists.
+    """
+    preset, changes = _preset(settings)
+    options: dict[str, Any] = {
+        "preset": preset, "search": changes, "seed": seed, "executor": "thread", "noise": noise_pct,
+        "motor_noise": motor_noise_pct, "time_limit_s": time_limit_s,
+    }  # fmt: skip
+    if workers is not None:
+        options["workers"] = workers
+    made = {"course": course, "grammar": grammar, "robot": robot}
+    objects: dict[str, Any] = {
+        kind: thing for kind, thing in made.items() if not isinstance(thing, str | Path)
+    }
+    names = {kind: str(thing) for kind, thing in made.items() if kind not in objects}
+    config = configure({**options, **names}, "evolve")
+    if out is not None:
+        return _evolve_into(Path(out), config, objects, fitness, tell)
+    task = _task(config, **objects)
+    evolution = task.evolution()
+    if fitness is None:
+        search(task, evolution, tell)
+        choose(task, evolution)
+    else:
+        _search_by(fitness, task, evolution, tell)
+    return Run(evolution.best, evolution.history, task.world, seed)
+
+
+def simulate(
+    program: str | Path | Program | Run,
+    course: str | Path | Course = "paper",
+    *,
+    robot: str | Path | Robot = "ev3",
+    noise_pct: float = 0.0,
+    motor_noise_pct: float = 0.0,
+    seed: int = 1,
+    time_limit_s: float = 60.0,
+) -> Simulation:
+    """Drive a program in the simulation.
+
+    Parameters
+    ----------
+    program
+        A program, its text, its file, or a run, whose best program drives.
+    course, robot
+        Names, files, or objects.
+    noise_pct, motor_noise_pct, seed
+        Noise of each sensor reading [%], of each command's strength [% of it], and its seed.
+    time_limit_s
+        When a drive without GOAL ends [s].
+
+    Raises
+    ------
+    InputError
+        If there is no such program, course or robot, or a value is out of bounds.
+    """
+    chosen = _program(program)
+    noise = Noise(noise_pct, 0.01 * motor_noise_pct)
+    world = World(_robot(robot), _course(course), time_limit_s=time_limit_s, noise=noise)
+    return Simulation(world, chosen, drive_program(world, chosen.opcodes, seed, trace=True))
+
+
+def discover(
+    recordings: str | Path | Case | Sequence[Recording],
+    holdout: Sequence[str] = (),
+    *,
+    robot: str | Path | Robot | None = None,
+    program: str | Path | Program | Run | None = None,
+    material: Material = DEFAULT,
+    seed: int = 0,
+    workers: int | None = None,
+    tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+) -> Verdict:
+    """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
+
+    Parameters
+    ----------
+    recordings
+        A folder of recordings of one robot, a recording's file, or what was read.
+    holdout
+        Names of the recordings to set aside; default: every fourth, or the last part of the only one.
+    robot
+        The robot as it is known: a name, a file or an object; default: what the recordings name.
+    program
+        Whose time of arrival tells sizes, too.
+    material
+        From what size on something is material.
+    seed
+        Random seed.
+    workers
+        Threads; default: one a core.
+    tell
+        Called with a line of progress.
+
+    Raises
+    ------
+    InputError
+        If a recording, a name, or a robot or course file is wrong.
+    """
+    if isinstance(recordings, str | Path):
+        case = read_case(recordings)
+    else:
+        case = recordings if isinstance(recordings, Case) else Case("recordings", tuple(recordings))
+    if not case.recordings:
+        raise expected("recordings", "none", "recordings of one robot")
+    known = None if robot is None else _robot(robot)
+    driven = None if program is None else _program(program)
+    return find_missing(case, holdout, known, seed, workers, tell, material=material, program=driven)
+
+
+def _preset(settings: str | Mapping[str, Any] | Settings) -> tuple[str, Mapping[str, Any]]:
+    """Return a preset's name, and what differs from it."""
+    if isinstance(settings, str):
+        return settings, {}
+    if isinstance(settings, Settings):
+        settings = {
+            k: v for k, v in settings.model_dump().items() if v != getattr(PRESETS[DEFAULT_PRESET], k)
+        }
+    return DEFAULT_PRESET, settings
+
+
+def _task(
+    config: Config, course: Course | None = None, grammar: Grammar | None = None, robot: Robot | None = None
+) -> Task:
+    """Load what a configuration names, and put objects in the place of the rest."""
+    task = load_task(config)
+    if grammar is not None:
+        check_robot_language(grammar)
+        task = replace(task, mapper=Mapper(grammar, task.mapper.options))
+    world = replace(task.world, course=course or task.world.course, robot=robot or task.world.robot)
+    return replace(task, world=world)
+
+
+def _evolve_into(
+    out: Path, config: Config, objects: Mapping[str, Any], fitness: Fitness | None, tell: Tell
+) -> Run:
+    """Evolve into a folder, as ``gecar evolve`` does."""
+    if objects:
+        raise expected("out", f"a {next(iter(objects))} made in Python", "its name or its file")
+    if fitness is not None:
+        raise expected("out", "a fitness of your own", "none, for a run that a folder can tell")
+    started = start(config, out)
+    finish(started, tell)
+    evolution = started.evolution
+    return Run(evolution.best, evolution.history, started.task.world, config.seed, out)
+
+
+def _search_by(fitness: Fitness, task: Task, evolution: Evolution[Program], tell: Tell) -> None:
+    """Run an evolution by a fitness of one's own."""
+    settings = task.config.search
+    score = FitnessEvaluator(
+        task.world, fitness, settings.draws, settings.arrival_share, task.config.seed, settings.needs_arrivals
+    )
+
+    def scores(asked: list[Candidate[Program]]) -> Any:
+        return score(
+            [c.program.opcodes for c in asked], [c.seed for c in asked], generation=len(evolution.history)
+        )
+
+    rehearse(settings, task.mapper, task.problem)
+    run(evolution, scores, tell)
+    if settings.draws > 1:
+        evolution.choose(evolution.contenders[0])
+
+
+def _course(course: str | Path | Course) -> Course:
+    return course if isinstance(course, Course) else load_course(course)
+
+
+def _robot(robot: str | Path | Robot) -> Robot:
+    return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
+def _program(program: str | Path | Program | Run) -> Program:
+    """Return a program: itself, a run's best, one in a file or a run's folder, or one written out."""
+    if isinstance(program, Program):
+        return program
+    if isinstance(program, Run):
+        return program.program
+    if isinstance(program, str) and "(" in program:
+        return parse_program(program)
+    place = Path(program)
+    return read_program(place / "best.txt" if place.is_dir() else place)
