@@ -21,6 +21,7 @@ from gecar.language.mapping import Mapper
 from gecar.language.program import Program, parse_program, read_program
 from gecar.language.robot_language import check_robot_language
 from gecar.reality.discovery import discover as find_missing
+from gecar.reality.invent.sentences import physics_grammar
 from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.recordings.recording import Case, Recording, read_case
 from gecar.reality.verdict import Verdict
@@ -232,6 +233,7 @@ def discover(
     robot: str | Path | Robot | None = None,
     program: str | Path | Program | Run | None = None,
     material: Material = DEFAULT,
+    invent: bool | None = None,
     seed: int = 0,
     workers: int | None = None,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
@@ -250,6 +252,8 @@ def discover(
         Whose time of arrival tells sizes, too.
     material
         From what size on something is material.
+    invent
+        Whether a law is written for what no effect explains; default: where what is left is material.
     seed
         Random seed.
     workers
@@ -270,7 +274,10 @@ def discover(
         raise expected("recordings", "none", "recordings of one robot")
     known = None if robot is None else _robot(robot)
     driven = None if program is None else _program(program)
-    return find_missing(case, holdout, known, seed, workers, tell, material=material, program=driven)
+    return find_missing(
+        case, holdout, known, seed, workers, tell, material=material, program=driven,
+        language=None if invent is False else physics_grammar(), invents=bool(invent),
+    )  # fmt: skip
 
 
 def _preset(settings: str | Mapping[str, Any] | Settings) -> tuple[str, Mapping[str, Any]]:
