@@ -166,7 +166,7 @@ def test_exported_program_laps_the_course_as_simulated(robot, world, lap, tmp_pa
     assert played.arrival_s == pytest.approx(simulated.time_s, rel=0.01)
     log = tmp_path / "log.csv"
     log.write_text("\n".join(played.printed) if target == "pybricks4" else played.files["gecar_log_2026.csv"])
-    imported = import_logs([log], robot, Setup(), ImportOptions())
+    (imported,) = import_logs([log], robot, Setup(), ImportOptions())
     assert imported.repairs == ()
     assert "white, black: [(100, 0)]" in imported.recording.setup.notes
     assert_is_the_drive(imported.recording, simulated.trace)

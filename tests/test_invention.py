@@ -86,6 +86,9 @@ def test_a_hidden_law_is_written_anew_and_closes_the_gap(hidden):
         assert law.left_out_gain > law.null_95
         assert law.holdout_gain > 0.0
     assert verdict.judgement.gap_closed > 0.9
+    assert verdict.next_recording.why.endswith(f"the law at {verdict.invented[0].term.port} further") or any(
+        law.alternatives for law in verdict.invented
+    )
     assert not set(verdict.fitted_on) & set(verdict.judgement.recordings)
 
 

@@ -188,7 +188,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
         residual=_what_is_left(context, stages, fitted, after),
-        next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained),
+        next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained, invented),
         robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
         limits=_limits(context, stages),
         fitted_on=tuple(r.name for r in split.fitted),

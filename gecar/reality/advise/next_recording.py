@@ -17,9 +17,10 @@ from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.verdict import Found, NextRecording
+from gecar.reality.verdict import Found, Invented, NextRecording
 from gecar.world.course.course import Course, load_course
 from gecar.world.robot import Robot
+from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
 Commands = tuple[tuple[float, float, float], ...]
@@ -58,6 +59,7 @@ def suggest(
     like: Recording,
     noise: Noise,
     unexplained: bool,
+    laws: Sequence[Invented] = (),
 ) -> NextRecording:
     """Return what to record next, and why.
 
@@ -75,6 +77,8 @@ def suggest(
         Of the sensors.
     unexplained
         Whether something is left that nothing explains.
+    laws
+        Those that were written, parts of ``robot``.
     """
     if rivals:
         confused = next(f for f in found if f.alternatives)
@@ -84,6 +88,8 @@ def suggest(
             words = f"{name}: no sequence of the library distinguishes {confused.id} from {others} with these sensors"
             return NextRecording(words, LIBRARY[name])
         return NextRecording(f"{name}: distinguishes {confused.id} from {others}", LIBRARY[name])
+    if laws:
+        return _about_laws(robot, laws, like, noise)
     if unexplained:
         name = "long and slow, then long and fast"
         return NextRecording(
@@ -101,6 +107,31 @@ def _at_interval_end(robot: Robot, found: Found) -> Robot:
     label, interval = next(iter(found.parameters.items()))
     values = {name: i.value for name, i in found.parameters.items()}
     return robot.with_effects({found.id: {**values, label: interval.high}})
+
+
+def _about_laws(robot: Robot, laws: Sequence[Invented], like: Recording, noise: Noise) -> NextRecording:
+    """Return what tells a law from one that does as well at another port, or else knows its constants better."""
+    doubtful = next((law for law in laws if law.alternatives), None)
+    if doubtful is None:
+        name, _ = _telling(robot, _with_law(robot, laws[0].term, _at_end(laws[0])), like, noise)
+        why = f"narrows the constants of the law at {laws[0].term.port} further"
+    else:
+        law, other = doubtful.term, doubtful.alternatives[0]
+        name, apart = _telling(robot, _with_law(robot, law, other), like, noise)
+        told = "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
+        why = f"{told} a law at {law.port} from one at {other.port}"
+    return NextRecording(f"{name}: {why}", LIBRARY[name])
+
+
+def _with_law(robot: Robot, law: Term, other: Term) -> Robot:
+    """Return a robot with another law in the place of one of its own."""
+    return robot.with_terms([other if term == law else term for term in robot.term])
+
+
+def _at_end(law: Invented) -> Term:
+    """Return a law with its first constant at the end of its interval."""
+    name, interval = next(iter(law.parameters.items()))
+    return law.term.with_constants({name: interval.high})
 
 
 def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, float]:
