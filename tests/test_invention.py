@@ -6,7 +6,9 @@ The proof that counts is on recordings of other worlds: ``python -m benchmarks.i
 from __future__ import annotations
 
 import json
+import warnings
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ from gecar.reality.invent.sentences import (
     read_sentence,
     single_laws,
 )
-from gecar.reality.recordings.recording import Case
+from gecar.reality.recordings.recording import Case, read_case
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_html
 from gecar.world.effects import CATALOGUE
@@ -44,6 +46,10 @@ FEW = parse_grammar(
     <p> ::= c * 1 | c * x | c * y
     <y> ::= c * turn_rate | c * 1
     """
+)
+PRACTICE = Path(__file__).parents[2] / "shared" / "recordings" / "practice" / "p03"
+needs_practice = pytest.mark.skipif(
+    not PRACTICE.is_dir(), reason="the practice cases (../shared/recordings) are not here"
 )
 UNRELATED = [effect for effect in CATALOGUE if effect.id in ("clock_skew", "pose_delay", "start_latency")]
 
@@ -116,6 +122,17 @@ def test_a_law_is_told_in_words_numbers_and_pictures():
     assert "supply_voltage = -1.5" in verdict_html(verdict, {})
     for each in (verdict, verdict_on(*TILT), verdict_on(DRAG)):
         assert is_whole(laws_figure(each))
+
+
+@needs_practice
+def test_an_effect_taken_out_is_written_anew_in_a_3d_world_with_a_course():
+    catalogue = [effect for effect in CATALOGUE if effect.id not in ("battery_resistance", "supply_voltage")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        verdict = discover(read_case(PRACTICE), catalogue=catalogue, language=FEW)
+    (law,) = (law for law in verdict.invented if law.term.port == "supply_voltage")
+    assert law.term.parsed.variables == ("draw",)
+    assert law.parameters["c1"].value == pytest.approx(-1.2, rel=0.15)
 
 
 def test_without_a_language_nothing_is_written():

@@ -206,9 +206,16 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     asked = share_asked_for(held.index, without, having)
     was, now = (before.problem.material.times(before.problem.sizes.of(held).left(p)) for p in physics)
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
-    whole = judge(*(Contender(robot, held) for robot in robots)).values()
+    whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
     better = sum(m.after for m in whole) < sum(m.before for m in whole)
     return cost(without) - cost(having) if asked.margin > 0.0 and now < HELPS * was and better else None
+
+
+def _of_own_kind(held: Residuals) -> Residuals:
+    """Return recordings set aside to be judged by their motion alone, where no path for readings is known yet."""
+    if held.sensor:
+        return held
+    return replace(held, recordings=tuple(replace(run, course=None) for run in held.recordings))
 
 
 def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
