@@ -108,6 +108,16 @@ def test_the_robot_found_carries_the_law(tmp_path):
     assert anew.verdict == "nothing"
 
 
+@pytest.mark.parametrize("own", [3, 4])
+def test_a_robot_that_is_full_of_laws_gets_no_more_than_fit(own):
+    none = Term(port="motor_torque", law="a * time", a=0.0)
+    runs = tuple(recorded(robot_with(*map(dict, TILT)), seed) for seed in range(4))
+    full = EV3.with_terms([none] * own)
+    verdict = discover(Case("full", runs), robot=full, catalogue=UNRELATED, language=FEW)
+    assert len(verdict.robot.term) <= 4
+    assert verdict.robot.physics["n_terms"] == len(verdict.robot.term)
+
+
 def test_a_law_is_told_in_words_numbers_and_pictures():
     verdict = verdict_on(SAG)
     assert (

@@ -94,7 +94,7 @@ class Law:
     variables: tuple[str, ...]
 
 
-def parse_law(text: str, port: Port, constants: Sequence[str], most: int, names: Sequence[str] = ()) -> Law:
+def parse_law(text: str, port: Port, constants: Sequence[str], most: int) -> Law:
     """Read a law.
 
     Parameters
@@ -107,8 +107,6 @@ def parse_law(text: str, port: Port, constants: Sequence[str], most: int, names:
         Names of its constants, in their order.
     most
         Tokens there is room for.
-    names
-        Variables beside the port's own.
 
     Raises
     ------
@@ -121,8 +119,7 @@ def parse_law(text: str, port: Port, constants: Sequence[str], most: int, names:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError(f"found law '{text}', expected a formula as -a * speed * abs(speed)") from None
-    allowed = (*port.variables, *names)
-    tokens = list(_postfix(tree, constants, allowed, port))
+    tokens = list(_postfix(tree, constants, port))
     if len(tokens) > most:
         raise ValueError(f"found a law of {len(tokens)} steps, expected at most {most}")
     if _deepest(tokens) > STACK:
@@ -134,42 +131,42 @@ def parse_law(text: str, port: Port, constants: Sequence[str], most: int, names:
     return Law(tuple(tokens), tuple(dict.fromkeys(by_number[k] for k in looked_at)))
 
 
-def _postfix(node: ast.AST, constants: Sequence[str], allowed: Sequence[str], port: Port) -> Iterator[int]:
+def _postfix(node: ast.AST, constants: Sequence[str], port: Port) -> Iterator[int]:
     """Yield a formula's tokens."""
     match node:
         case ast.BinOp(left, operator, right) if type(operator) in _MARKS:
-            yield from _postfix(left, constants, allowed, port)
-            yield from _postfix(right, constants, allowed, port)
+            yield from _postfix(left, constants, port)
+            yield from _postfix(right, constants, port)
             yield OPERATOR[_MARKS[type(operator)]]
         case ast.BinOp(base, ast.Pow(), ast.Constant(2)):
-            yield from _postfix(base, constants, allowed, port)
+            yield from _postfix(base, constants, port)
             yield OPERATOR["square"]
         case ast.UnaryOp(ast.USub(), inner):
-            yield from _postfix(inner, constants, allowed, port)
+            yield from _postfix(inner, constants, port)
             yield OPERATOR["negative"]
         case ast.UnaryOp(ast.UAdd(), inner):
-            yield from _postfix(inner, constants, allowed, port)
+            yield from _postfix(inner, constants, port)
         case ast.Call(ast.Name(name), arguments, []) if name in FUNCTIONS:
             wanted = 2 if OPERATOR[name] < FIRST_OPERATOR + OF_TWO else 1
             if len(arguments) != wanted:
                 raise ValueError(f"found {name} of {len(arguments)} values, expected {wanted}")
             for argument in arguments:
-                yield from _postfix(argument, constants, allowed, port)
+                yield from _postfix(argument, constants, port)
             yield OPERATOR[name]
         case ast.Name(name) if name in constants:
             yield list(constants).index(name)
-        case ast.Name(name) if name in allowed:
+        case ast.Name(name) if name in port.variables:
             yield FIRST_VARIABLE + VARIABLE[name]
         case _:
-            raise _no_law(node, constants, allowed, port)
+            raise _no_law(node, constants, port)
 
 
-def _no_law(node: ast.AST, constants: Sequence[str], allowed: Sequence[str], port: Port) -> ValueError:
+def _no_law(node: ast.AST, constants: Sequence[str], port: Port) -> ValueError:
     if isinstance(node, ast.Name):
         given = ", ".join(constants) or "none"
         return ValueError(
             f"found '{node.id}', expected a constant given beside the law ({given}) "
-            f"or a variable of {port.id}: {', '.join(allowed)}"
+            f"or a variable of {port.id}: {', '.join(port.variables)}"
         )
     found = ast.unparse(node) if isinstance(node, ast.expr) else type(node).__name__
     return ValueError(

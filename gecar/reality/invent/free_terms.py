@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,18 +53,15 @@ class FreeTerms:
         Their vector, shape (effects' parameters,).
     terms
         Laws whose constants are free.
-    linear_only
-        Whether only linear constants are.
     """
 
     model: Parameters
     start: Array
     terms: tuple[Term, ...]
-    linear_only: bool = False
     constants: tuple[Constant, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        found = [c for k, term in enumerate(self.terms) for c in _constants(k, term, self.linear_only)]
+        found = [c for k, term in enumerate(self.terms) for c in _constants(k, term)]
         object.__setattr__(self, "constants", tuple(found))
 
     @property
@@ -106,10 +102,6 @@ class FreeTerms:
             values[c.term][c.name] = float(c.at(at))
         return tuple(term.with_constants(v) for term, v in zip(self.terms, values, strict=True))
 
-    def with_terms(self, terms: Sequence[Term]) -> FreeTerms:
-        """Return this with other terms."""
-        return FreeTerms(self.model, self.start, tuple(terms), self.linear_only)
-
 
 def usual_size(term: Term) -> float:
     """Return the size of a linear constant whose law gives about a hundredth of what is much at its port."""
@@ -118,19 +110,18 @@ def usual_size(term: Term) -> float:
     return 0.01 * BY_PORT[term.port].worth / (shape if shape > 1e-6 else 1.0)
 
 
-def _constants(k: int, term: Term, linear_only: bool) -> list[Constant]:
+def _constants(k: int, term: Term) -> list[Constant]:
     free, of_law = [], linear(term)
     for number, name in enumerate(term.free):
         value = term.constants[name]
         if name in of_law:
             size = max(abs(value) * INNER_STEP, usual_size(term))
             free.append(Constant(k, name, CONSTANTS + number, value, size, False))
-        elif not linear_only and value:
+        elif value:
             free.append(Constant(k, name, CONSTANTS + number, value, INNER_STEP, True))
-    if not linear_only:
-        for name, slot in zip(POINT, (AT_X, AT_Y), strict=True):
-            if name in term.constants:
-                free.append(Constant(k, name, slot, term.constants[name], POINT_STEP_M, False))
-        if term.store:
-            free.append(Constant(k, "store_s", STORE_S, term.store_s, INNER_STEP, True))
+    for name, slot in zip(POINT, (AT_X, AT_Y), strict=True):
+        if name in term.constants:
+            free.append(Constant(k, name, slot, term.constants[name], POINT_STEP_M, False))
+    if term.store:
+        free.append(Constant(k, "store_s", STORE_S, term.store_s, INNER_STEP, True))
     return free

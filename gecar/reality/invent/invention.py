@@ -22,7 +22,7 @@ from gecar.reality.fitting.model import Effects, Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
-from gecar.reality.invent.proof import largest_gains, left_out_gains
+from gecar.reality.invent.proof import Proof, largest_gains, left_out_gains
 from gecar.reality.invent.search import Law, Library, search
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
@@ -31,15 +31,16 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE, SIGNIFICANCE
+from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
-from gecar.world.ports import PORTS
+from gecar.world.ports import N_TERMS, PORTS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
 
 MOST_LAWS = 3
+TRIED = 3  # of the best laws, until one is proved
 HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
 ROUNDS = 6
 
@@ -90,19 +91,21 @@ def invent(
     written = Written(replace(explained, taken=known), (), ())
     for number in range(MOST_LAWS):
         here = written.explained
+        if len(here.problem.estimator.robot.term) == N_TERMS:
+            break
         library = Library(here.problem, here.taken)
         found = search(library, grammar, ports, seed + number, tell)
-        nulls = largest_gains(library, seed)
-        proved = next((law for law in found[:3] if _is_proved(library, law, nulls)), None)
+        proved = _first_proved(library, found, largest_gains(library, seed))
         if proved is None:
             break
-        more = _pruned(_added(written, explained, library, proved), explained)
+        law, proof = proved
+        more = _pruned(_added(written, explained, library, law), explained)
         gain = _gain_set_aside(written.explained, more.explained, held)
         if gain is None:
             break
-        told = _told(library, proved, _indistinguishable(proved, found), nulls, gain)
+        told = _told(library, law, _indistinguishable(law, found), proof, gain)
         written = replace(more, invented=(*written.invented, *told))
-        tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in proved.terms)}")
+        tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in law.terms)}")
         if not written.explained.unexplained:
             break
     return replace(written, invented=_with_constants_of(written, explained)) if written.terms else written
@@ -120,13 +123,12 @@ def _ports(problem: Problem) -> list[str]:
     return [port.id for port in PORTS if port.sensor in sensors and (port.on_bench or not problem.on_bench)]
 
 
-def _is_proved(library: Library, law: Law, nulls: Array) -> bool:
-    """Whether left-out recordings ask for a law, more than chance would give any law of the search."""
-    if law.worth < PRICE:
-        return False
-    gains = left_out_gains(library, law)
-    p = (1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls))
-    return bool(p < SIGNIFICANCE and np.mean(gains > 0.0) > 0.5)
+def _first_proved(library: Library, found: Sequence[Law], nulls: Array) -> tuple[Law, Proof] | None:
+    """Return the best law that left-out recordings ask for, with its proof; None where the best few are all chance."""
+    for law in found[:TRIED]:
+        if law.worth >= PRICE and (proof := Proof(left_out_gains(library, law), nulls)).holds:
+            return law, proof
+    return None
 
 
 def _added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
@@ -245,11 +247,10 @@ def _with_constants_of(written: Written, first: Explanation) -> tuple[Invented, 
 
 
 def _told(
-    library: Library, law: Law, others: Sequence[Law], nulls: Array, held_gain: float
+    library: Library, law: Law, others: Sequence[Law], proof: Proof, held_gain: float
 ) -> list[Invented]:
     """Return what the verdict says of each term of a law, but for its constants."""
-    problem = library.problem
-    left_out, physics = float(left_out_gains(library, law).sum()), law.parameters.physics(law.minimum.z)
+    problem, physics = library.problem, law.parameters.physics(law.minimum.z)
     return [
         Invented(
             term=term,
@@ -257,9 +258,9 @@ def _told(
             parameters={},
             looks_like=looks_like(term),
             holdout_gain=held_gain,
-            left_out_gain=left_out,
-            null_95=float(np.quantile(nulls, 0.95)),
-            p=float((1 + np.sum(nulls >= left_out)) / (1 + len(nulls))),
+            left_out_gain=proof.gain,
+            null_95=proof.null_95,
+            p=proof.p,
             spread=spread_of_size(problem.estimator.blocks.folds, library.model.errors, law.minimum.errors),
             range=ranges(term, problem.residuals.recordings, physics),
             size=problem.sizes.apart(physics, library.model.physics),

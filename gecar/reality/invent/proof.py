@@ -2,16 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.invent.search import Law, Library
 from gecar.reality.optimisation.least_squares import costs, jacobian, weights
+from gecar.reality.selection.thresholds import SIGNIFICANCE
 
 Array = npt.NDArray[np.float64]
 
 DRAWS = 500
 RIDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a law gains on left-out folds, shape (folds,), and what any law gains by chance, shape (draws,)."""
+
+    gains: Array
+    nulls: Array
+
+    @property
+    def gain(self) -> float:
+        """What it gains on all of them."""
+        return float(self.gains.sum())
+
+    @property
+    def null_95(self) -> float:
+        """The 95 % quantile of what any law gains by chance."""
+        return float(np.quantile(self.nulls, 0.95))
+
+    @property
+    def p(self) -> float:
+        """Share of draws in which some law gains as much."""
+        return float((1 + np.sum(self.nulls >= self.gain)) / (1 + len(self.nulls)))
+
+    @property
+    def holds(self) -> bool:
+        """Whether it gains more than chance would give any law, and on most folds."""
+        return bool(self.p < SIGNIFICANCE and np.mean(self.gains > 0.0) > 0.5)
 
 
 def left_out_gains(library: Library, law: Law) -> Array:
@@ -20,12 +51,9 @@ def left_out_gains(library: Library, law: Law) -> Array:
     The model without it is as it was fitted to all.
     """
     blocks = library.problem.estimator.blocks
-    residual, z, errors = (
-        library.problem.estimator.residual(law.parameters),
-        law.minimum.z,
-        law.minimum.errors,
-    )
-    slopes, w = sensitivities(library, law), weights(errors)
+    free, z, errors = law.parameters, law.minimum.z, law.minimum.errors
+    residual = library.problem.estimator.residual(free)
+    slopes, w = jacobian(residual, z, errors, free.probes, free.bounds[1]), weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     folds, fitted = np.unique(blocks.folds), []
     for k in folds:
@@ -33,7 +61,7 @@ def left_out_gains(library: Library, law: Law) -> Array:
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * errors[rows])
         ridge = RIDGE * np.diag(np.maximum(np.diag(normal), 1e-9))
-        fitted.append(np.clip(z + np.linalg.solve(rest + ridge, pull), *law.parameters.bounds))
+        fitted.append(np.clip(z + np.linalg.solve(rest + ridge, pull), *free.bounds))
     before = np.bincount(blocks.folds, costs(library.model.errors))
     if len(folds) < 2:
         return np.array([law.gain])
@@ -45,12 +73,6 @@ def left_out_gains(library: Library, law: Law) -> Array:
     )
     out: Array = before[folds] - after
     return out
-
-
-def sensitivities(library: Library, law: Law) -> Array:
-    """Return the derivatives of residuals by a fitted law's parameters, shape (n, k)."""
-    free, at = law.parameters, law.minimum
-    return jacobian(library.problem.estimator.residual(free), at.z, at.errors, free.probes, free.bounds[1])
 
 
 def largest_gains(library: Library, seed: int) -> Array:

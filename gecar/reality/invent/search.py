@@ -38,6 +38,7 @@ from gecar.reality.invent.sentences import (
 )
 from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
 from gecar.reality.selection.problem import Problem
+from gecar.world.ports import N_TERMS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -213,7 +214,8 @@ def search(
     tell
         Called with a line of progress.
     """
-    there = at_ports(grammar, ports)
+    room = N_TERMS - len(library.problem.estimator.robot.term)
+    there = at_ports(grammar, ports, room)
     singles = single_laws(there)
     tell(f"{len(singles)} laws one by one")
     for first in range(0, len(singles), TOGETHER):

@@ -9,6 +9,7 @@ from typing import Any
 
 from gecar.errors import InputError, expected
 from gecar.language.grammar import Grammar, load_grammar
+from gecar.world.ports import N_TERMS
 from gecar.world.terms import POINT, Term
 
 Laws = tuple[Term, ...]
@@ -165,8 +166,8 @@ def _expanded(grammar: Grammar, parts: Sequence[str | int], left: int) -> Iterat
     yield "".join(str(part) for part in parts)
 
 
-def at_ports(grammar: Grammar, ports: Sequence[str]) -> Grammar:
-    """Return a grammar of laws at some ports alone.
+def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Grammar:
+    """Return a grammar of laws at some ports alone, at so many at once at the most.
 
     Raises
     ------
@@ -175,8 +176,8 @@ def at_ports(grammar: Grammar, ports: Sequence[str]) -> Grammar:
     """
     numbers = []
     for number in range(len(grammar.rules[0].productions)):
-        names = _first(grammar, number).partition(":")[0]
-        if all(name.strip() in ports for name in names.split(" and ")):
+        names = _first(grammar, number).partition(":")[0].split(" and ")
+        if len(names) <= most and all(name.strip() in ports for name in names):
             numbers.append(number)
     if not numbers:
         raise expected(

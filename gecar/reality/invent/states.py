@@ -23,7 +23,6 @@ from gecar.reality.replay.kernel import (
     Y,
 )
 from gecar.reality.residuals.of_recording import RecordingResiduals
-from gecar.world.ports import VARIABLES
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -80,6 +79,3 @@ def ranges(
         name: (min(float(t[name].min()) for t in tables), max(float(t[name].max()) for t in tables))
         for name in term.parsed.variables
     }
-
-
-UNITS = {variable.id: variable.unit for variable in VARIABLES}
