@@ -1,3 +1,4 @@
+import threading
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from gecar.reality.calibrate.constants import CONSTANTS, chosen, with_constants
 from gecar.reality.recordings.camera_frame import corrected
 from gecar.reality.recordings.recording import Case, Recording, make_recording, read_case, write_recording
 from gecar.reality.recordings.setup import Setup
+from gecar.reality.residuals.threads import Threads
 from gecar.report.calibration import calibration_lines, calibration_table
 from gecar.world.robot import load_robot, read_robot
 
@@ -185,6 +187,19 @@ def test_constants_that_do_not_explain_the_misfit_are_told_and_discover_is_named
     assert "left_angle_deg" in result.unexplained
     assert "gecar discover" in "\n".join(calibration_lines(result))
     assert calibrated().unexplained == calibrated().worse == ()
+
+
+def test_threads_end_with_their_block_after_an_error_too():
+    before = threading.active_count()
+    with pytest.raises(ValueError, match="invalid literal"), Threads(2) as threads:
+        threads.map(int, ["1", "2", "a word"])
+    assert threading.active_count() == before
+
+
+def test_calibrate_leaves_no_thread_behind():
+    before = threading.active_count()
+    calibrate(Case("bench", (bench(0.3), bench(0.6), bench(0.9))), names=["battery.voltage"])
+    assert threading.active_count() == before
 
 
 def test_a_robot_file_of_a_bench_is_enough(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gecar.reality.invent.formula import NAMES, _chosen, _Signal, _signal
+from gecar.reality.invent.formula import NAMES, _chosen, _Signal, _signal, _sparse
 
 MEMORY_S = 1.0
 
@@ -38,3 +38,17 @@ def test_terms_go_through_the_replay_s_memory_whatever_the_rows(uneven: bool) ->
     signal = drifting(t)
     found = float(signal.pull[0] / signal.normal[0, 0])
     assert found == pytest.approx(0.5, rel=0.03)
+
+
+def test_the_seed_draws_the_resamples() -> None:
+    """Two terms that are nearly the same: a resample chooses either, and the seed decides how many choose one."""
+    rng = np.random.default_rng(0)
+    signals = []
+    for _ in range(5):
+        terms = 0.1 * rng.normal(size=(40, len(NAMES)))
+        terms[:, 1] = terms[:, 0] + rng.normal(size=40)
+        terms[:, 2] = terms[:, 1] + 0.02 * rng.normal(size=40)
+        signals.append(_Signal(terms[:, 1] + 0.3 * rng.normal(size=40), terms))
+    found = [_sparse("v", "m/s", signals, seed) for seed in (0, 0, 1, 2, 3, 4)]
+    assert found[0] == found[1]
+    assert len(set(map(str, found))) > 1

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from concealing import EV3, recorded
 from linear_case import bumps, linear, linear_problem
 from scipy.stats import t as student
 
+from gecar.reality import discovery
 from gecar.reality.fitting.model import Model
-from gecar.reality.selection.problem import Problem
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.problem import Problem, problem_of
+from gecar.reality.selection.stepwise import explain
 from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, intervals
 from gecar.world.effects import BY_ID
 
-VISCOUS, INERTIA = "viscous_friction", "rotor_inertia"
+VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
 SIZE = BY_ID[VISCOUS].parameters[0].worthwhile
 
 
@@ -57,3 +67,39 @@ def test_an_interval_that_contains_neutral_is_told() -> None:
         problem = linear_problem(linear({VISCOUS: size}, {VISCOUS: bumps(1, 4, 1.0)}))
         model = fitted(problem, VISCOUS)
         assert contains_neutral(model, VISCOUS, intervals(problem.estimator, model)) is contained
+
+
+def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    truth, responses = {VISCOUS: 3.0, TRACK: 4.0}, {VISCOUS: bumps(1, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
+    proof = confirmed(explain(linear_problem(linear(truth, responses))), linear(truth, responses, seed=5))  # type: ignore[arg-type]
+    assert {step.effect for step in proof.explained.steps} == {VISCOUS, TRACK}
+
+    def wide(*given: object) -> dict:
+        spans = intervals(*given)  # type: ignore[arg-type]
+        for label, span in spans.get(VISCOUS, {}).items():
+            spans[VISCOUS][label] = replace(span, low=0.0)
+        return spans
+
+    monkeypatch.setattr(discovery, "intervals", wide)
+    stage = discovery._with_intervals(SimpleNamespace(tell=print, seed=0), proof)  # type: ignore[arg-type]
+    assert [step.effect for step in stage.explained.steps] == [TRACK]
+    assert stage.explained.taken.effects == (TRACK,)
+    assert [step.effect for step in stage.candidates] == [VISCOUS]
+
+
+def test_the_interval_of_a_patch_holds_the_truth_and_follows_the_seed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where derivatives say nothing, a random walk does; short here."""
+    monkeypatch.setattr("gecar.reality.uncertainty.mcmc.STEPS", 800)
+    patch = {"x_m": 1.05, "y_m": 0.52, "radius_m": 0.1, "coefficient": 0.08}
+    runs = [recorded(EV3.with_effects({"slippery_patch": patch}), k, seconds=4.0) for k in range(2)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    estimator = problem_of(residuals, EV3, ("slippery_patch",)).estimator
+    model = estimator.fit(("slippery_patch",), {"slippery_patch": patch})
+    found = intervals(estimator, model, seed=1)["slippery_patch"]
+    assert all(found[name].low < value < found[name].high for name, value in patch.items())
+    assert intervals(estimator, model, seed=1)["slippery_patch"] == found
+    assert intervals(estimator, model, seed=2)["slippery_patch"] != found

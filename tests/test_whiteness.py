@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from concealing import EV3, recorded
 from linear_case import bumps, linear, linear_problem
 
+from gecar.reality import discovery
 from gecar.reality.prove.whiteness import whiteness
+from gecar.reality.recordings.recording import Case
 from gecar.reality.selection.problem import Problem
 
 VISCOUS = "viscous_friction"
@@ -38,3 +42,19 @@ def test_the_seed_draws_the_nulls() -> None:
     found = {whiteness(problem, problem.known, seed)[1] for seed in range(6)}
     assert len(found) > 1
     assert whiteness(problem, problem.known, 4) == whiteness(problem, problem.known, 4)
+
+
+def test_the_seed_of_a_discovery_reaches_all_that_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds = dict[str, int]()
+    for name in ("whiteness", "describe", "intervals"):
+        real = getattr(discovery, name)
+        monkeypatch.setattr(
+            discovery,
+            name,
+            lambda *given, name=name, real=real: seeds.update({name: given[2]}) or real(*given),
+        )
+    turned = [recorded(EV3, seed, seconds=4.0) for seed in range(3)]
+    turned = [replace(run, heading_rad=run.heading_rad + 0.3 * (run.t_s > 2.0)) for run in turned]
+    verdict = discovery.discover(Case("made", tuple(turned)), seed=7, catalogue=())
+    assert verdict.verdict == "unexplained"
+    assert seeds == {"whiteness": 7, "describe": 7, "intervals": 7}
