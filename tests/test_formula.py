@@ -34,7 +34,7 @@ def drifting(t: np.ndarray) -> _Signal:
 def test_terms_go_through_the_replay_s_memory_whatever_the_rows(uneven: bool) -> None:
     t = np.arange(0.0, 12.0, 0.01)
     if uneven:
-        t = np.r_[t[t < 6.0], t[t >= 6.0][::10]]
+        t = np.r_[t[t < 6.0][::10], t[t >= 6.0]]  # while the drift still grows
     signal = drifting(t)
     found = float(signal.pull[0] / signal.normal[0, 0])
     assert found == pytest.approx(0.5, rel=0.03)

@@ -28,6 +28,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -94,8 +95,9 @@ class Law:
     variables: tuple[str, ...]
 
 
-def parse_law(text: str, port: Port, constants: Sequence[str], most: int) -> Law:
-    """Read a law.
+@lru_cache(maxsize=4096)
+def parse_law(text: str, port: Port, constants: tuple[str, ...], most: int) -> Law:
+    """Read a law; the last few thousand that were read are kept.
 
     Parameters
     ----------

@@ -7,13 +7,14 @@ cause and no part of a robot.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 from scipy.integrate import cumulative_trapezoid
 
 from gecar.reality.invent.formula import NAMES, TARGETS, Formula, state_terms
+from gecar.reality.prove.holdout import Correction
 from gecar.reality.replay.kernel import AHEAD, ASIDE, HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.replayer import Replayer
 from gecar.reality.replay.rigid_alignment import pose_errors
@@ -21,7 +22,6 @@ from gecar.reality.replay.rigid_alignment import pose_errors
 Array = npt.NDArray[np.float64]
 FEWEST_POSES = 3
 PASSES = 3  # the formula reads angles that it moves itself
-Correction = Callable[[Replayer, Array, Array], tuple[Array, Array]]
 
 
 def with_formulas(formulas: Sequence[Formula]) -> Correction:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gecar.reality.materiality import Size, combined
 from gecar.reality.noise.sensor_noise import PATH_CAUTION
-from gecar.reality.recordings.dead_reckoning import integrated
+from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.replay.kernel import HEADING, X, Y
 from gecar.reality.replay.odometry import smoothed_rows
 from gecar.reality.replay.smoothed_path import measured_path
@@ -150,11 +150,8 @@ def _seen(run: RecordingResiduals, rows: Array, physics: Physics) -> Array:
 
 def _reckoned(run: RecordingResiduals, physics: Physics, angles: Array) -> Array:
     """Return a path by dead reckoning from wheel angles [rad]: columns 0 and 1."""
-    p, t = physics[0], run.replayer.t
-    rolled = np.column_stack([smoothed_rows(angles[:, k], t) for k in range(2)]) * p["wheel_radius"]
-    moved = np.diff(rolled, axis=0)
-    ahead, turn = moved.mean(axis=1), (moved[:, 1] - moved[:, 0]) / p["track_width"]
-    return integrated(ahead, np.zeros(len(ahead)), turn, np.zeros(3))
+    left, right = (smoothed_rows(angles[:, k], run.replayer.t) for k in range(2))
+    return wheel_odometry(left, right, float(physics["wheel_radius"][0]), float(physics["track_width"][0]))
 
 
 def _rolled(run: RecordingResiduals, physics: Physics, angle: Array) -> Array:
