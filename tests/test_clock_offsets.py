@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from concealing import EV3, recorded
 
-from gecar.reality.fitting.clock_offsets import scattered, with_fitted_clocks
+from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.problem import scattered
 
 
 def late(run: Recording, by_s: float) -> Recording:

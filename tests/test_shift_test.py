@@ -48,7 +48,7 @@ def test_one_null_in_twenty_is_called_a_regime_whatever_the_lengths(lengths: np.
 def test_the_best_place_of_a_null_is_called_a_place_no_more_often(
     lengths: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gecar.reality.locate.shift_test.LEAST_GAIN", -1.0)  # every null has a best place
+    monkeypatch.setattr("gecar.reality.locate.shift_test.DISC_SHARE", -1.0)  # every null has a best place
     rng = np.random.default_rng(1)
     found = [
         best_disc(lasting_energy(rng, lengths), drives(rng, lengths), lengths, rng, 99) for _ in range(NULLS)

@@ -22,7 +22,6 @@ PROBE_S = 0.002
 LONGEST_S = 0.2
 LARGEST_MOVE_S = 0.03
 CLOSE_S = 2e-4
-SCATTER_S = 0.002  # offsets that spread by less are one common delay
 
 
 def with_fitted_clocks(residuals: Residuals, physics: npt.NDArray[Any]) -> tuple[Residuals, float]:
@@ -52,8 +51,3 @@ def with_fitted_clocks(residuals: Residuals, physics: npt.NDArray[Any]) -> tuple
         if not better.any() or np.max(np.abs(move)) < CLOSE_S:
             break
     return residuals.with_clock_offsets(best), float(np.sum(costs(errors)))
-
-
-def scattered(offsets_s: Array) -> bool:
-    """Whether offsets differ from recording to recording by more than one common delay can."""
-    return len(offsets_s) >= 2 and float(np.std(offsets_s)) > SCATTER_S

@@ -14,7 +14,7 @@ from gecar.reality.locate.regimes import regime_masks
 from gecar.reality.locate.shift_test import DRAWS, best_disc, regime_p
 from gecar.reality.replay.channels import CHANNELS, REFLECTION, ResidualIndex
 from gecar.reality.residuals.of_recording import RecordingResiduals
-from gecar.reality.selection.thresholds import SIGNIFICANCE
+from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.verdict import Place
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +26,6 @@ SPOT_M, SPOT_S = 0.15, 0.4  # how far from a spot, and how long after it, what h
 MOST = 8
 CLIP = 30.0
 WORTH = 0.3  # excess energy a sample, in noise variances, below which a channel has nothing to show
-FAINT = 0.02  # of the strongest channel's energy, of motion or of sight: less is not worth an entry
 SPAN_BINS = 2  # bins a span is made of
 STRONGEST = 0.25  # of a channel's energy lies in the spans that are pointed at
 GROUPS = (
@@ -128,7 +127,7 @@ class MismatchMap:
         order = self._order()
         found = []
         most = np.where(np.arange(len(CHANNELS)) < REFLECTION, excess[:REFLECTION].max(), excess[REFLECTION])
-        for channel in np.flatnonzero((mean > WORTH) & (excess > FAINT * most)):
+        for channel in np.flatnonzero((mean > WORTH) & (excess > NEGLIGIBLE * most)):
             entries = [self._regime(int(channel), name, mask, rng) for name, mask in self.masks.items()]
             entries.append(self._place(int(channel), rng))
             group = order.index(_GROUP[channel])

@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.selection.thresholds import DISC_SHARE
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 Lengths = npt.NDArray[np.int64]
@@ -23,7 +25,6 @@ DRAWS = 499
 PITCH_M = 0.1
 RADII_M = (0.1, 0.2, 0.3)
 COVERED = 1.5  # times its share of the time a disc's energy is counted above
-LEAST_GAIN = 0.3  # of the energy, above that: less is no place
 FEWEST_BINS = 50
 
 
@@ -81,7 +82,7 @@ def best_disc(
     share = COVERED * discs.sum(axis=(1, 2)) / seen.sum()
     gains = (discs * energy).sum(axis=(1, 2)) / whole - share
     best = int(np.argmax(gains))
-    if gains[best] < LEAST_GAIN:
+    if gains[best] < DISC_SHARE:
         return None
     sums = _shifted_sums(energy, discs, lengths, _shifts(lengths, rng, draws))
     p = _p(float(gains[best]), (sums / whole - share[:, None]).max(axis=0))

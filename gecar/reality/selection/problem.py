@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.clock_offsets import scattered, with_fitted_clocks
+from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.discrepancy import discrepancy
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import ripple_responses
@@ -18,7 +18,7 @@ from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.parting import Sizes
-from gecar.reality.selection.thresholds import LARGE, PRICE, SMALL
+from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL
 from gecar.world.effects import BY_ID, Parameter
 from gecar.world.robot import Robot
 
@@ -200,3 +200,8 @@ def small_sensitivities(problem: Problem, model: Model) -> dict[str, Array]:
 def _small(effect: str) -> list[Parameter]:
     """Return the parameters that may be off a little: derivatives at neutral say what that does."""
     return [] if effect == RIPPLE else [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0]
+
+
+def scattered(offsets_s: Array) -> bool:
+    """Whether offsets differ from recording to recording by more than one common delay can."""
+    return len(offsets_s) >= 2 and float(np.std(offsets_s)) > CLOCKS_SCATTER_S

@@ -22,6 +22,7 @@ from gecar.reality.selection.thresholds import (
     DOUBTFUL_FIT,
     NEGLIGIBLE,
     PRICE,
+    PROMISING,
     SEARCHED,
 )
 from gecar.world.effects import BY_ID, Search
@@ -29,7 +30,6 @@ from gecar.world.effects import BY_ID, Search
 Array = npt.NDArray[np.float64]
 
 IMPROVED, REFITTED = 10, 5  # effects of a stage that are improved by two iterations, and fitted in full
-PROMISING = 0.5  # of the price of a name: what is tried at all
 SHORT = 8  # generations of a first search
 FINALIST_SPREAD = 0.6  # of a parameter's search spread, for the second search
 DOUBTFUL_SPREAD = 1.5  # of a parameter's search spread, about a fit that leaves much

@@ -27,30 +27,34 @@ _EXAMINED = "first two examinations"
 _EMPTY = "81 cases of the 3D engine with nothing concealed"
 
 # -- Evidence
-SIGNIFICANCE = Threshold(0.05, "p-value below which something is taken for real", "convention")
+SIGNIFICANCE = Threshold(0.05, "p-value below which an effect is significant", "convention")
 ONE_FOLD = Threshold(
-    0.9, "share of a step's gain in one recording from which leaving that out tells nothing", "hand"
+    0.9, "share of a step's gain in one recording above which leaving it out is no test", "hand"
 )
 
 # -- Forward selection
-MOST_EFFECTS = Threshold(4, "effects a robot on the floor is given", "hand")
+MOST_EFFECTS = Threshold(4, "most effects of a robot on the floor", "hand")
 MOST_ON_BENCH = Threshold(
-    7, "effects a motor on a bench is given: it is known to tenths of a percent", "hand"
+    7, "most effects of a motor on a bench, which is known to tenths of a percent", "hand"
 )
-COMPETING = Threshold(0.3, "share of the best gain below which an effect is no rival", "hand")
+COMPETING = Threshold(0.3, "share of the best gain below which an effect is no alternative candidate", "hand")
 NEGLIGIBLE = Threshold(
     0.02,
-    "share of a gain, of excess energy, of information on a parameter, that is as good as none",
+    "share of a gain, of excess energy, of information on a parameter, that counts as none",
     "hand",
 )
+PROMISING = Threshold(0.5, "share of the price of a name an effect must promise to be fitted at all", "hand")
 SEARCHED = Threshold(2.0, "prices of a name an effect must gain to be searched without derivatives", "hand")
-DOUBTFUL_FIT = Threshold(1.5, "excess energy a block after which a fit is searched about", "hand")
+DOUBTFUL_FIT = Threshold(1.5, "excess energy per block above which the search continues around a fit", "hand")
 
 # -- Clocks of the camera
 CLOCKS_FIRST = Threshold(
     0.8, "share of the best effect's gain from which clock offsets are fitted first", _EXAMINED
 )
 CLOCKS_OVER_COMMON = Threshold(1.3, "times the gain of a common delay that offsets must reach", _EXAMINED)
+CLOCKS_SCATTER_S = Threshold(
+    0.002, "standard deviation of clock offsets below which they are one common delay [s]", "hand"
+)
 
 # -- What explains, and what imitates
 WHOLE_SHARE = Threshold(0.85, "share of all excess energy that effects together must explain", _EXAMINED)
@@ -66,13 +70,13 @@ STEADY = Threshold(
 )
 LEFT_SHARE = Threshold(
     0.15,
-    "share of what parted before that may be left without a word",
+    "share of the initial error that may remain without being reported as unexplained",
     "laws are off by up to 12 % of an effect's size (`Parameter.model_error`)",
 )
 
 MEASURED = Threshold(
     2.0,
-    "times the line of what is material that what is left must be: it holds the errors of measuring it",
+    "times the limit of what is material that the remaining error must exceed, because it includes measurement errors",
     "hand",
 )
 
@@ -114,6 +118,18 @@ HOTSPOT = Threshold(
     22.0,
     "standard deviations of a cell's excess energy that make it a place",
     "200 empty cases of the 3D engine stayed below 16; ridges of 1.3 to 2.4 mm reached 34 to 79",
+)
+DISC_SHARE = Threshold(
+    0.3,
+    "share of the energy, above 1.5 times its share of the time, that makes a disc a place",
+    "hand",
+)
+
+# -- The next recording
+TOLD_APART = Threshold(
+    9.0,
+    "squared standard deviations by which a recording must differ to distinguish two robots",
+    "three sigma",
 )
 
 
