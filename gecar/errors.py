@@ -1,4 +1,4 @@
-"""The one kind of error a user can cause and mend."""
+"""Errors in input, which a user can correct."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 class InputError(ValueError):
-    """Something handed to gecar is not what it must be; the message is one line a user can act on.
+    """An input is not valid; the message is one line that says how to correct it.
 
-    Control characters in what it quotes, a line end in a file's name say, are spelt out.
+    Control characters in quoted input, such as a line end in a file's name, are escaped.
     """
 
     def __init__(self, message: str) -> None:
@@ -29,9 +29,9 @@ def expected(where: str | Path, found: object, wanted: str) -> InputError:
     where
         File with its line or field, or the option: ``grammars/paper.bnf, line 3`` or ``--workers``.
     found
-        What stands there.
+        What was found there.
     wanted
-        What should.
+        What was expected.
 
     Returns
     -------
@@ -42,18 +42,18 @@ def expected(where: str | Path, found: object, wanted: str) -> InputError:
 
 
 def one_of(where: str | Path, found: str, known: Iterable[str], wanted: str = "") -> InputError:
-    """Make the error for a name that is none of those known; it asks for the nearest one.
+    """Make the error for an unknown name; it suggests the most similar one.
 
     Parameters
     ----------
     where
         As in `expected`.
     found
-        The name that stands there.
+        The name that was found.
     known
-        Which names there are.
+        The known names.
     wanted
-        What else may stand there, such as ``a course file (.toml)``.
+        What else is accepted, such as ``a course file (.toml)``.
     """
     names = list(known)
     near = difflib.get_close_matches(found, names, 1, 0.6)

@@ -97,9 +97,9 @@ def spawn(seed: int, generation: int, attempt: int, n: int) -> Streams:
     seed
         The run's seed.
     generation
-        Generation they are bred for.
+        Number of the generation.
     attempt
-        How often the generation was bred before.
+        How often the generation was drawn before.
     n
         How many; the first ones are the same for any n.
 

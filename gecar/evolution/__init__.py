@@ -1,1 +1,1 @@
-"""Grammatical Evolution as ask and tell: genomes, operators, selection; what is evolved is the caller's."""
+"""Grammatical Evolution with an ask-and-tell interface: genomes, operators, selection, for any problem."""

@@ -4,7 +4,7 @@ evolution = Evolution(Mapper(load_grammar("table1")), phenotype=formula, fitness
 evolution.run()
 print(evolution.best.program, evolution.best.fitness)
 
-Without a fitness it asks and is told: it says which programs it wants scored, and is told their scores.
+Without a fitness, use ask and tell: `ask` returns the programs to score, `tell` takes their scores.
 
 evolution = Evolution(Mapper(load_grammar("table1")), seed=1)
 while not evolution.finished:
@@ -24,13 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import InputError, expected
-from gecar.evolution.breeding import Bred, Breeder
 from gecar.evolution.crossover import Genomes
 from gecar.evolution.fitness import Fitness, FitnessProblem
 from gecar.evolution.history import HISTORY, Generation, Patience, Totals, summary
 from gecar.evolution.lineage import Ledger
 from gecar.evolution.operators import Operators
 from gecar.evolution.problem import P, Problem
+from gecar.evolution.reproduction import Offspring, Reproduction
 from gecar.evolution.score_cache import ScoreCache
 from gecar.evolution.scores import Scores, merits
 from gecar.evolution.settings import EvolutionSettings
@@ -38,9 +38,9 @@ from gecar.evolution.state import Best, Candidate, State
 from gecar.language.mapping import Derivation, Mapper
 
 CONTENDERS = 40
-"""Best programs kept, to choose from at the end."""
+"""Number of best programs kept for the choice of the winner."""
 BARREN = 1_000
-"""Genomes without a single phenotype after which an evolution gives up."""
+"""Genomes without a single phenotype after which an evolution stops with an error."""
 
 
 class Evolution(Generic[P]):
@@ -49,26 +49,25 @@ class Evolution(Generic[P]):
     Parameters
     ----------
     mapper
-        What genomes derive.
+        Maps genomes to derivations.
     problem
-        In the place of phenotype and fitness, for problems whose scores are more than numbers.
+        Instead of phenotype and fitness, for problems whose scores are not plain numbers.
     settings
         Sizes, rates and names of operators; by default the paper's Table 4.
     seed
         Random seed; equal seeds, equal runs.
     phenotype
-        What a derivation means: returns the program, or None where it is none; by default its text. Derivations of
+        Returns the program of a derivation, or None if it has none; by default the derivation's text. Derivations of
         equal text share a score.
     fitness
-        How good a program is: a function that returns a number, lower is better, or a
-        `gecar.evolution.fitness.Fitness`, which says more.
+        A function that returns a number for a program, lower is better, or a `gecar.evolution.fitness.Fitness`.
     operators
-        What it breeds with, in the place of those the settings name.
+        Operators that replace those named in the settings.
 
     Raises
     ------
     InputError
-        If the seed is no whole number from 0 up, or operators, mapper and scores do not suit each other.
+        If the seed is not a whole number from 0 up, or operators, mapper and scores are not compatible.
     """
 
     def __init__(
@@ -99,9 +98,9 @@ class Evolution(Generic[P]):
         self._best: Best[P] | None = None
         self._contenders: dict[bytes, Best[P]] = {}
         self._cache = ScoreCache(problem.score_type)
-        self._breeder = Breeder(settings, operators, mapper, problem, seed)
+        self._reproduction = Reproduction(settings, operators, mapper, problem, seed)
         self._barren = 0
-        self._bred: Bred[P] | None = None
+        self._offspring: Offspring[P] | None = None
         self._parents = np.zeros((0, 2), np.int32)
         self._ledger = Ledger()
         self._patience = Patience(settings.restart_after, problem.failure)
@@ -118,14 +117,14 @@ class Evolution(Generic[P]):
         settings: EvolutionSettings | None = None,
         operators: Operators | None = None,
     ) -> Evolution[P]:
-        """Go on from a state, to the same end as if there had been no break.
+        """Continue from a state; the result is the same as without interruption.
 
         Parameters
         ----------
         state
-            What `state` returned.
+            Returned by `state`.
         mapper, problem, settings, operators
-            Those of the evolution it is from; `problem` is an attribute of it.
+            Those of the interrupted evolution, which has its problem as attribute `problem`.
         """
         evolution = cls(mapper, problem, settings, state.seed, operators=operators)
         evolution.history = [Generation(*row.tolist()) for row in state.history]
@@ -135,14 +134,14 @@ class Evolution(Generic[P]):
         evolution._ledger = Ledger(state.lineage, going_on=True)
         evolution._earlier_s = evolution.history[-1].wall_s
         evolution._cache.add([row.tobytes() for row in state.digests], state.cached)
-        (found,) = evolution._breeder.read(state.best_genome[None])
+        (found,) = evolution._reproduction.read(state.best_genome[None])
         program = None if found is None else found.program
         evolution._best = Best(state.best_genome, state.best_score, state.best_generation, program)
         known = zip(
             state.contenders, state.contender_scores, state.contender_generations.tolist(), strict=True
         )
         for phenotype, (genome, score, generation) in zip(
-            evolution._breeder.read(state.contenders), known, strict=True
+            evolution._reproduction.read(state.contenders), known, strict=True
         ):
             if phenotype is not None:
                 best = Best(
@@ -152,12 +151,12 @@ class Evolution(Generic[P]):
         return evolution
 
     def state(self) -> State:
-        """Return what `resume` needs.
+        """Return the state for `resume`.
 
         Raises
         ------
         InputError
-            If there is no finished generation, or one is asked for and not told.
+            If no generation is finished, or one waits for its scores.
         """
         self._refuse_while_asked("state")
         best = self.best
@@ -184,13 +183,13 @@ class Evolution(Generic[P]):
 
     @property
     def finished(self) -> bool:
-        """Whether the last generation has its scores, or the best program is as good as the problem asks for."""
+        """Whether the last generation has its scores, or the best program reaches the problem's target."""
         solved = self._best is not None and self.problem.solved(self._best.score[0])
         return self.generation == self.settings.generations or solved
 
     @property
     def totals(self) -> Totals:
-        """What has been spent so far."""
+        """Evaluations, simulated programs and steps so far."""
         last = self.history[-1] if self.history else None
         return Totals(last.evaluations, last.simulated, last.steps) if last else Totals()
 
@@ -209,41 +208,40 @@ class Evolution(Generic[P]):
 
     @property
     def contenders(self) -> list[Best[P]]:
-        """The best programs so far by merit, the best first; where scores never change that is the best alone."""
+        """The best programs so far by merit, the best first; only the best if scores never change."""
         ranked = sorted(self._contenders.values(), key=lambda contender: _rank(contender.score[0]))
         return ranked or [self.best]
 
     def choose(self, contender: Best[P]) -> None:
-        """Make a contender the best: what looked best may have been lucky, as fresh draws show."""
+        """Make a contender the best, for instance after new draws showed that another one was lucky."""
         self._best = contender
 
     @property
     def parents(self) -> npt.NDArray[np.int32]:
-        """Parents of the generation asked for or told of last; see `gecar.evolution.breeding.Bred`."""
+        """Parents of the latest generation; see `gecar.evolution.reproduction.Offspring`."""
         return self._parents
 
     def ask(self) -> list[Candidate[P]]:
-        """Breed the next generation and return the programs in it that have no score yet, each once.
+        """Make the next generation and return the programs in it without a score, each once.
 
-        Also those whose problem `wants_more` scores of them. There may be none; `tell` them all the same.
+        So are programs for which the problem `wants_more` scores. Call `tell` even if the list is empty.
 
         Raises
         ------
         InputError
-            If the last generation asked for has not been told, the run is finished, or no genome so far had a
-            phenotype.
+            If the last generation has no scores yet, the run is finished, or no genome so far had a phenotype.
         """
         self._refuse_while_asked("ask")
         if self.finished:
             raise expected("ask", f"all {self.generation} generations done", "an unfinished run")
         if self._began is None:
             self._began = time.perf_counter()
-        self._bred = self._breed()
-        self._refuse_barren(self._bred)
-        self._parents = self._bred.parents
+        self._offspring = self._reproduce()
+        self._refuse_barren(self._offspring)
+        self._parents = self._offspring.parents
         programs: dict[bytes, P] = {}
         self._asked = {}
-        for i, phenotype in enumerate(self._bred.phenotypes):
+        for i, phenotype in enumerate(self._offspring.phenotypes):
             if phenotype is not None and self._wants_drives(phenotype.digest):
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
@@ -255,7 +253,7 @@ class Evolution(Generic[P]):
         ]
 
     def tell(self, results: Any) -> Generation:
-        """Take the scores of the programs asked for.
+        """Take the scores of the programs that `ask` returned.
 
         Parameters
         ----------
@@ -271,18 +269,18 @@ class Evolution(Generic[P]):
         Raises
         ------
         InputError
-            If nothing is asked for, or the results do not fit.
+            If no generation waits for scores, or the results do not match it.
         """
-        if self._bred is None:
+        if self._offspring is None:
             raise expected("tell", "no generation that waits for scores", "ask first")
         told = self._pooled(self.problem.check(results, len(self._asked)))
-        bred, scores = self._bred, self._score(self._bred, told)
+        offspring, scores = self._offspring, self._score(self._offspring, told)
         self._cache.add(list(self._asked), told)
-        self.genomes, self.scores, self._bred = bred.genomes, scores, None
-        self._record(bred, told)
-        keys = [b"" if phenotype is None else phenotype.key for phenotype in bred.phenotypes]
+        self.genomes, self.scores, self._offspring = offspring.genomes, scores, None
+        self._record(offspring, told)
+        keys = [b"" if phenotype is None else phenotype.key for phenotype in offspring.phenotypes]
         ranked = merits(scores, True, self.problem.failure)
-        self._ledger.add(bred.parents, bred.changed, ranked, keys)
+        self._ledger.add(offspring.parents, offspring.changed, ranked, keys)
         return self.history[-1]
 
     def run(
@@ -290,22 +288,22 @@ class Evolution(Generic[P]):
         after: Callable[[Generation], None] = lambda generation: None,  # noqa: ARG005
         map: Callable[..., Iterable[Any]] = map,  # noqa: A002
     ) -> Best[P]:
-        """Ask the fitness and be told until the evolution is finished; return the best program.
+        """Score generations with the fitness until the evolution is finished; return the best program.
 
-        Where one fitness is not like the next (`Fitness.draws`), the best programs of the run are scored afresh at the
-        end, and the best of these is chosen: what looked best may have been lucky.
+        If the fitness is random (`Fitness.draws`), the best programs of the run are scored again at the end, and the
+        best of these is chosen, so that the winner is not a lucky draw.
 
         Parameters
         ----------
         after
             Called with each generation's record.
         map
-            What applies a function to each of a list, such as the ``map`` of an executor with many processes.
+            Applies a function to each element of a list, such as the ``map`` of an executor with several processes.
 
         Raises
         ------
         InputError
-            If there is no fitness, it returns something else than numbers, or nothing that was bred had a phenotype.
+            If there is no fitness, it does not return numbers, or no genome had a phenotype.
         """
         if not isinstance(self.problem, FitnessProblem):
             raise expected("run", f"a {type(self.problem).__name__}", "a fitness; otherwise ask and tell")
@@ -319,17 +317,17 @@ class Evolution(Generic[P]):
             self.choose(self.contenders[int(np.argmin(means))])
         return self.best
 
-    def _refuse_barren(self, bred: Bred[P]) -> None:
-        """Give up where nothing has a phenotype, instead of breeding on for ever without a word."""
+    def _refuse_barren(self, offspring: Offspring[P]) -> None:
+        """Raise an error if no genome has a phenotype, instead of running for ever."""
         if self._best is not None and self._best.program is not None:
             return
-        if any(phenotype is not None for phenotype in bred.phenotypes):
+        if any(phenotype is not None for phenotype in offspring.phenotypes):
             self._barren = 0
             return
-        self._barren += len(bred.genomes)
+        self._barren += len(offspring.genomes)
         if self._barren >= BARREN:
-            self._bred = None
-            raise self._no_phenotype(self._barren, bred.genomes)
+            self._offspring = None
+            raise self._no_phenotype(self._barren, offspring.genomes)
 
     def _no_phenotype(self, n: int, genomes: Genomes | None = None) -> InputError:
         mapped = self.mapper.map(self.genomes if genomes is None else genomes)
@@ -358,65 +356,65 @@ class Evolution(Generic[P]):
                     told[k] = known[0]
         return told
 
-    def _breed(self) -> Bred[P]:
+    def _reproduce(self) -> Offspring[P]:
         generation, known = len(self.history), self._cache.__contains__
         stagnant = self._patience.at_its_end
         if stagnant and self.settings.restart == "grown" and self._patience.restarts > 0:
             return self._grow(generation, known)
         if stagnant or not self.history:
-            return self._breeder.begin(generation, known)
-        return self._breeder.next(self.genomes, self.scores, generation, known)
+            return self._reproduction.begin(generation, known)
+        return self._reproduction.next(self.genomes, self.scores, generation, known)
 
-    def _grow(self, generation: int, known: Callable[[bytes], bool]) -> Bred[P]:
-        """Breed from the contenders by duplicating subtrees.
+    def _grow(self, generation: int, known: Callable[[bytes], bool]) -> Offspring[P]:
+        """Make a population from the contenders by duplicating subtrees.
 
         The lineage knows parents in the generation before only: contenders of earlier ones count as none, -1.
         """
         contenders = self.contenders
         genomes = np.array([one.genome for one in contenders])
         scores = np.concatenate([one.score for one in contenders])
-        bred = self._breeder.next(genomes, scores, generation, known, grown=True)
+        offspring = self._reproduction.next(genomes, scores, generation, known, grown=True)
         before = {genome.tobytes(): i for i, genome in enumerate(self.genomes)}
         places = np.array([before.get(genome.tobytes(), -1) for genome in genomes], np.int32)
-        return replace(bred, parents=places[bred.parents])
+        return replace(offspring, parents=places[offspring.parents])
 
-    def _score(self, bred: Bred[P], told: Scores) -> Scores:
+    def _score(self, offspring: Offspring[P], told: Scores) -> Scores:
         """Put together the population's scores: invalid, known before, or told now."""
-        scores = self.problem.failed(len(bred.genomes))
-        digests = {i: p.digest for i, p in enumerate(bred.phenotypes) if p is not None}
+        scores = self.problem.failed(len(offspring.genomes))
+        digests = {i: p.digest for i, p in enumerate(offspring.phenotypes) if p is not None}
         known = [i for i, digest in digests.items() if digest not in self._asked]
         scores[known] = self._cache.look_up([digests[i] for i in known])
         for members, score in zip(self._asked.values(), told, strict=True):
             scores[members] = score
         return scores
 
-    def _record(self, bred: Bred[P], told: Scores) -> None:
+    def _record(self, offspring: Offspring[P], told: Scores) -> None:
         totals = Totals(
-            self.totals.evaluations + len(bred.genomes),
+            self.totals.evaluations + len(offspring.genomes),
             self.totals.simulated + len(told),
             self.totals.steps + int(told["steps"].sum()),
         )
-        programs = len({phenotype.digest for phenotype in bred.phenotypes if phenotype is not None})
+        programs = len({phenotype.digest for phenotype in offspring.phenotypes if phenotype is not None})
         record = summary(
             len(self.history), self.scores, programs, totals, self._wall_s(), self.problem.failure
         )
         self.history.append(record)
         self._patience.see(self.history[-1].best)
         if self.problem.rescored:
-            self._keep_contenders(bred)
+            self._keep_contenders(offspring)
         fittest = int(np.lexsort((-self.scores["share"], self.scores["merit"]))[0])
         if self._best is None or _rank(self.scores[fittest]) < _rank(self._best.score[0]):
-            phenotype = bred.phenotypes[fittest]
+            phenotype = offspring.phenotypes[fittest]
             program = None if phenotype is None else phenotype.program
             score = self.scores[fittest : fittest + 1].copy()
-            self._best = Best(bred.genomes[fittest].copy(), score, self.generation, program)
+            self._best = Best(offspring.genomes[fittest].copy(), score, self.generation, program)
 
-    def _keep_contenders(self, bred: Bred[P]) -> None:
+    def _keep_contenders(self, offspring: Offspring[P]) -> None:
         """Keep the best programs so far, with what is known of them now."""
-        for i, phenotype in enumerate(bred.phenotypes):
+        for i, phenotype in enumerate(offspring.phenotypes):
             if phenotype is not None and self.scores["merit"][i] < self.problem.failure:
                 score, known = self.scores[i : i + 1].copy(), self._contenders.get(phenotype.digest)
-                found = known or Best(bred.genomes[i].copy(), score, self.generation, phenotype.program)
+                found = known or Best(offspring.genomes[i].copy(), score, self.generation, phenotype.program)
                 self._contenders[phenotype.digest] = replace(found, score=score)
             elif phenotype is not None:
                 self._contenders.pop(phenotype.digest, None)
@@ -435,7 +433,7 @@ class Evolution(Generic[P]):
         return self._earlier_s + (0.0 if self._began is None else time.perf_counter() - self._began)
 
     def _refuse_while_asked(self, where: str) -> None:
-        if self._bred is not None:
+        if self._offspring is not None:
             found = f"generation {len(self.history)} asked for and not told"
             raise expected(where, found, f"tell with the {len(self._asked)} scores first")
 
@@ -461,7 +459,7 @@ def run(
 
 
 def rehearse(settings: EvolutionSettings, mapper: Mapper, problem: Problem[P]) -> None:
-    """Run two small generations that score nothing, so that all compiled code is there before the clock runs."""
+    """Run two small generations without scores, so that everything is compiled before time is measured."""
     elites = min(settings.elites, 1)
     small = settings.model_copy(update={"population": elites + 4, "elites": elites, "generations": 1})
     run(Evolution(mapper, problem, small, 0), lambda asked: problem.failed(len(asked)))

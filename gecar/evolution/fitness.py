@@ -1,10 +1,10 @@
-"""A phenotype and a fitness: all an evolution has to know of a problem.
+"""A problem defined by a phenotype and a fitness.
 
 Fitness(error)                                        one number, lower is better
 Fitness(eaten, maximise=True, target=89)              one number, higher is better; 89 ends the run
 Fitness(errors, scores=20, overall=np.mean)           an error for each of 20 cases, for lexicase; their mean ranks
-Fitness(error_and_size, scores=2)                     two aims; the first ranks
-Fitness(walk, draws=8)                                chance has a part: walk(program, rng), up to eight times
+Fitness(error_and_size, scores=2)                     two objectives; the first ranks
+Fitness(walk, draws=8)                                a random fitness: walk(program, rng), up to eight draws
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ SCORED = 1
 
 @dataclass(frozen=True)
 class Fitness(Generic[P]):
-    """How good a program is.
+    """The fitness of a program.
 
     Attributes
     ----------
     function
-        Takes the program and returns its score, or as many as there are; nan or inf where it fails. None: scores are
-        told.
+        Takes the program and returns its score, or several; nan or inf if it fails. None: the caller of `tell` supplies
+        scores.
     scores
-        How many it returns.
+        Number of scores it returns.
     maximise
-        Whether higher is better; where there are several scores, for each or for all.
+        Whether higher is better; for all scores, or for each.
     overall
-        Makes one number, lower is better, of the scores (scores,), those that are maximised with their sign turned. It
-        ranks individuals in tournaments, as elites and as the best. None: the first score.
+        Computes one number, lower is better, from the scores (scores,); maximised scores are negated before. It ranks
+        individuals in tournaments, as elites and as the best. None: the first score.
     target
         First score of a program that is good enough to end the run; with ``overall``, its value.
     draws
-        1, or how often a program is scored where chance has a part: once in each generation that has it, up to so
-        often, and the mean counts. ``function`` takes a `numpy.random.Generator` then, too.
+        1; or, for a random fitness, how often a program is scored at most: once in each generation in which it occurs.
+        The mean counts. ``function`` then also takes a `numpy.random.Generator`.
     """
 
     function: Callable[..., Any] | None = None

@@ -114,12 +114,12 @@ success within 36 generations, the other one never."""
 
 
 class Patience:
-    """Tells when a population is stagnant: so many generations without a better program.
+    """Decides when a population is stagnant: after a number of generations without a better program.
 
     Parameters
     ----------
     generations
-        How many, once it holds a success; without one it has `WITHOUT_SUCCESS` times as many. 0 is without end.
+        That number, once a program has succeeded; `WITHOUT_SUCCESS` times as many before. 0: no limit.
     failure
         Merit of a program that fails.
     """
@@ -131,12 +131,12 @@ class Patience:
 
     @property
     def at_its_end(self) -> bool:
-        """Whether the population is stagnant, and gives way to another."""
+        """Whether the population is stagnant, and is to be replaced."""
         limit = self._limit if self._best < self._failure else WITHOUT_SUCCESS * self._limit
         return 0 < limit <= self._idle
 
     def see(self, best: float) -> None:
-        """Take the best merit of a generation; after an end it is that of a new population."""
+        """Add the best merit of a generation; after a restart, of the new population."""
         if self.at_its_end:
             self._best, self._idle = self._failure, 0
             self.restarts += 1
@@ -153,7 +153,7 @@ class Pace:
     Attributes
     ----------
     evaluations_per_s
-        Individuals scored each second of late.
+        Individuals scored per second in the latest generations.
     left_s
         Time to the last generation at that rate [s].
     """

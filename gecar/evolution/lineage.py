@@ -26,8 +26,8 @@ CROSSOVER, MUTATION, CREEP, DUPLICATION = 1, 2, 4, 8
 INDIVIDUAL = np.dtype(
     [("parent", "<i4"), ("mate", "<i4"), ("merit", "<f4"), ("changed", "u1"), ("codons", "<i4")]
 )
-"""``parent``, ``mate``: places in the generation before, as in `gecar.evolution.breeding.Bred`. ``merit``: time to GOAL
-[s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: what made its program another than its
+"""``parent``, ``mate``: places in the generation before, as in `gecar.evolution.reproduction.Offspring`. ``merit``: time
+to GOAL [s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: what made its program another than its
 parent's, `CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`. ``codons``: bytes kept of its codons, one each unless they
 are larger; none if nothing changed it."""
 
@@ -144,7 +144,7 @@ class Lineage:
         return int(self.generations[member[0]]["changed"][member[1]])
 
     def parents(self, member: Member) -> list[Member]:
-        """Return its parent, and its mate if that had a part in its program; none if it was bred from nobody."""
+        """Return its parent, and its mate if that had a part in its program; none if it has no parents."""
         generation, place = member
         row = self.generations[generation][place]
         if row["parent"] < 0:

@@ -1,4 +1,4 @@
-"""Operators as objects: whatever has the protocol takes the place of any of them.
+"""Operators as objects: any object with the same protocol can replace one.
 
 evolution = Evolution(mapper, fitness=error, operators=Operators.of(settings, select=Tournament(2), mutation=mine))
 """
@@ -30,11 +30,11 @@ LONGEST = 54
 class Variation(Protocol):
     """Changes children: crossover, mutation, or anything else.
 
-    These attributes, which need not be there, say more of it.
+    These attributes are optional.
 
     ``change``: `gecar.evolution.lineage.CROSSOVER`, `MUTATION` (the default), `CREEP` or `DUPLICATION`.
     ``linear``: whether it needs a mapper that reads codons from the first on (default: no).
-    ``fresh``: whether children owe nothing to their parents (default: no).
+    ``fresh``: whether children are independent of their parents (default: no).
     """
 
     def __call__(self, genomes: Any, mapper: Any, streams: Streams) -> Genomes:
@@ -53,18 +53,18 @@ class Variation(Protocol):
 
 @dataclass(frozen=True)
 class Operators:
-    """What an evolution breeds with.
+    """The operators of an evolution.
 
     Attributes
     ----------
     initialise
-        Makes first populations.
+        Makes initial populations.
     select
         Selects parents.
     vary
         Change children, one after the other: crossover, mutation and so on.
     grow
-        Take their place in a population that grows; see `restart` of `EvolutionSettings`.
+        Replace them after a restart with duplication; see `restart` of `EvolutionSettings`.
     """
 
     initialise: Initialisation
@@ -111,12 +111,12 @@ class Operators:
 
 
 def change_of(operator: Variation) -> np.uint8:
-    """Return the bit that says in a lineage what changed a program."""
+    """Return the bit for an operator in a lineage."""
     return np.uint8(getattr(operator, "change", MUTATION))
 
 
 def any_fresh(operators: Sequence[Variation]) -> bool:
-    """Whether children owe nothing to their parents."""
+    """Whether children are independent of their parents."""
     return any(getattr(operator, "fresh", False) for operator in operators)
 
 

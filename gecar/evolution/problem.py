@@ -1,7 +1,7 @@
-"""Problems: what is evolved. An evolution asks its problem what a derivation means and how scores compare.
+"""Problems: what is evolved. A problem reads programs from derivations and ranks scores.
 
-A phenotype and a fitness make one: `gecar.evolution.fitness`. What wants more, such as scores with fields of their own,
-is a subclass of `Problem`, as `gecar.search.programs` has it for the robot.
+A phenotype and a fitness define one: `gecar.evolution.fitness`. A problem whose scores have more fields is a subclass
+of `Problem`, such as that of the robot in `gecar.search.programs`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ def seed_of(content: bytes, seed: int) -> int:
 
 
 class Problem(ABC, Generic[P]):
-    """What an evolution must know of its programs; `read` and `meaning` are for subclasses to say."""
+    """A problem; subclasses implement `read` and `meaning`."""
 
     @property
     def score_type(self) -> np.dtype[np.void]:
-        """Dtype of scores, with the fields of `gecar.evolution.scores.FIELDS` among its own."""
+        """Dtype of scores; it includes the fields of `gecar.evolution.scores.FIELDS`."""
         return np.dtype(list(FIELDS))
 
     @property
@@ -46,17 +46,17 @@ class Problem(ABC, Generic[P]):
 
     @property
     def rescored(self) -> bool:
-        """Whether `wants_more` may hold: a program met again is then scored again, and the best may change."""
+        """Whether `wants_more` may hold: a program that occurs again is then scored again, and the best may change."""
         return False
 
     @property
     def n_cases(self) -> int:
-        """How many cases `cases` tells apart, for ``lexicase``; 0 where there are none."""
+        """Number of cases that `cases` returns, for ``lexicase``; 0 without any."""
         return 0
 
     @abstractmethod
     def read(self, derivation: Derivation) -> P | None:
-        """Return the program that was derived; None where the derivation is none."""
+        """Return the program of a derivation; None if it has none."""
 
     @abstractmethod
     def meaning(self, program: P, derivation: Derivation) -> bytes:

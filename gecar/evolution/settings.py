@@ -1,4 +1,4 @@
-"""What an evolution does: sizes, rates and which operators, with the paper's Table 4 as the default."""
+"""Settings of an evolution: sizes, rates and operators; the defaults are the paper's Table 4."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Rate = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
 class EvolutionSettings(BaseModel):
-    """What any evolution does; the defaults are the paper's Table 4.
+    """Settings of any evolution; the defaults are the paper's Table 4.
 
     Attributes
     ----------
     population, generations
         Individuals, and number of generations after the first population.
     codons
-        Gene length: codons 0..255 of each genome.
+        Genome length: number of codons, each 0..255.
     elites
-        Best individuals that stay as they are.
+        Number of best individuals that are copied unchanged.
     initialisation
         ``uniform``: random codons. ``sensible``: derivation trees grown or full, up to `initial_depth`
         (Ryan and Azad 2003). ``ptc2``: trees of 1 to `initial_expansions` expansions, expanded at random
@@ -31,7 +31,7 @@ class EvolutionSettings(BaseModel):
     initial_depth
         Greatest depth of a ``sensible`` tree.
     initial_expansions
-        Most codons a ``ptc2`` tree aims at.
+        Largest number of expansions of a ``ptc2`` tree.
     selection
         ``tournament``; or ``lexicase``: by the problem's cases, in random order, each as good as the best within
         the median absolute deviation (Spector 2012, La Cava 2016).
@@ -39,31 +39,31 @@ class EvolutionSettings(BaseModel):
         Individuals in a tournament.
     crossover
         ``one_point``: anywhere in the genome, the same point in both. ``one_point_used``: within the codons
-        both parents use. ``variable_one_point``: within the codons each parent uses, a point of its own in either
-        (PonyGE2's default). ``subtree``: subtrees of the same nonterminal change places.
+        both parents use. ``variable_one_point``: within the codons each parent uses, at a different point in each
+        (PonyGE2's default). ``subtree``: subtrees of the same nonterminal are swapped.
     crossover_rate
         Share of pairs that are crossed.
     mutation
         ``codon``: any codon of the genome. ``used_codon``: only codons the child uses. ``one_used_codon``: the
-        same with one codon a child on average, whatever `mutation_rate` says (PonyGE2's default). ``renew``:
-        every child is a new random individual, which makes the whole a random search.
+        same, one codon per child on average, independent of `mutation_rate` (PonyGE2's default). ``renew``: every
+        child is a new random individual, which makes a random search.
     mutation_rate
-        Probability of a codon to be drawn anew.
+        Probability that a codon is replaced by a random one.
     creep_rate
-        Probability of a used codon that chooses a number to step to a neighbouring one.
+        Probability that a used codon that chooses a number changes to a neighbouring number.
     creep_most
-        Most numbers of a child that step, on average; inf: no limit.
+        Largest mean number of such changes per child; inf: no limit.
     duplicates
-        ``kept``; or bred again, up to `attempts` times, where the same program is already in the
-        ``generation``, or was scored before in the ``run``.
+        ``kept``; or replaced, up to `attempts` times, if the same program is already in the ``generation``, or was
+        scored before in the ``run``.
     attempts
-        How often a duplicate is bred again.
+        How often a duplicate is replaced.
     restart_after
-        Generations without a better program after which the population gives way to another; as long as none has
-        succeeded, four times as many. The best so far stays the run's result. 0: never.
+        Generations without a better program after which the population is replaced; four times as many while none has
+        succeeded. The best program so far is kept as the run's result. 0: never.
     restart
-        What it gives way to. ``random``: a first population. ``grown``: that once, so that two beginnings compete, and
-        from then on the best programs so far with one of their subtrees doubled: they grow from what they can do.
+        The new population. ``random``: random individuals. ``grown``: random individuals at the first restart, later
+        the best programs so far with one of their subtrees duplicated.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -1,4 +1,4 @@
-"""What goes in and out of an evolution: candidates, the best so far, and all that is needed to go on."""
+"""Inputs and outputs of an evolution: candidates, the best so far, and the state for resuming."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Genomes = npt.NDArray[np.integer[Any]]
 
 @dataclass(frozen=True)
 class Candidate(Generic[P]):
-    """A program that wants a score, the seed of its noise, the best merit so far, the generation."""
+    """A program to be scored, the seed of its noise, the best merit so far, the generation."""
 
     program: P
     seed: int
@@ -50,12 +50,12 @@ class Best(Displayed, Generic[P]):
 
     @property
     def merit(self) -> float:
-        """What selection goes by; lower is better."""
+        """The number that ranks individuals in selection; lower is better."""
         return float(self.score["merit"][0])
 
     @property
     def fitness(self) -> float | Floats:
-        """What the fitness function said, (scores,) where it says several; of several draws the mean."""
+        """The fitness function's value, (scores,) if there are several; the mean of several draws."""
         values = self.score["values"][0] if "values" in (self.score.dtype.names or ()) else [self.merit]
         return float(values[0]) if len(values) == 1 else np.asarray(values, float)
 

@@ -1,4 +1,4 @@
-"""Breeding: operators put together in the order the paper lists them."""
+"""Reproduction: selection and variation, in the order of the paper."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ Int32s = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Bred(Generic[P]):
-    """Individuals that wait for their scores.
+class Offspring(Generic[P]):
+    """New individuals, without scores yet.
 
     Attributes
     ----------
     genomes
         Elites first (population, codons).
     phenotypes
-        Their programs; None where a genome maps to none.
+        Their programs; None if a genome maps to none.
     parents
-        Indices in the population before (population, 2): whose genome it was, and whom it was paired with; an
-        elite's are twice itself, those of the first population and of ``renew`` are -1.
+        Indices of parent and mate in the population before (population, 2). An elite is its own parent and mate;
+        those of a random individual are -1.
     changed
-        Which operators changed what the genome derives (population,), as bits; see `gecar.evolution.lineage`.
+        Which operators changed the derivation (population,), as bits; see `gecar.evolution.lineage`.
     """
 
     genomes: Genomes
@@ -48,24 +48,24 @@ class Bred(Generic[P]):
 
 
 Drawn = tuple[Genomes, Int32s, Bytes]
-"""Genomes, parents and changes, as in `Bred`."""
+"""Genomes, parents and changes, as in `Offspring`."""
 
 
-class Breeder(Generic[P]):
-    """Breeds populations; what it breeds depends on nothing but its arguments.
+class Reproduction(Generic[P]):
+    """Makes populations; they depend only on the arguments.
 
     Parameters
     ----------
     settings
-        Sizes, and what is done about duplicates.
+        Sizes, and how duplicates are treated.
     operators
-        What it breeds with.
+        Initialisation, selection and variation.
     mapper
-        What genomes derive.
+        Maps genomes to derivations.
     problem
-        What derivations mean, and how scores compare.
+        Reads programs from derivations and ranks scores.
     seed
-        The run's.
+        Random seed of the run.
     """
 
     def __init__(
@@ -81,11 +81,11 @@ class Breeder(Generic[P]):
         self._phenotypes = Phenotypes(mapper, problem)
 
     def read(self, genomes: Genomes) -> list[Phenotype[P] | None]:
-        """Return what genomes derive."""
+        """Return the phenotypes of genomes."""
         return self._phenotypes.read(genomes)
 
-    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Bred[P]:
-        """Return a first population: that of generation 0, or of a later one that begins anew."""
+    def begin(self, generation: int, known: Callable[[bytes], bool]) -> Offspring[P]:
+        """Return an initial population, at generation 0 or at a restart."""
         settings = self.settings
 
         def draw(attempt: int) -> Drawn:
@@ -102,8 +102,8 @@ class Breeder(Generic[P]):
         generation: int,
         known: Callable[[bytes], bool],
         grown: bool = False,
-    ) -> Bred[P]:
-        """Return the population bred from one that has its scores.
+    ) -> Offspring[P]:
+        """Return the population that follows one with scores.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ class Breeder(Generic[P]):
     def _vary(
         self, operators: tuple[Variation, ...], children: Genomes, streams: Streams
     ) -> tuple[Genomes, Bytes]:
-        """Return the children as the operators leave them, and which operators changed what they derive."""
+        """Return the children after all operators, and which operators changed their derivations."""
         changed, before = np.zeros(len(children), np.uint8), self.mapper.map(children)
         for operator in operators:
             children = operator(children, self.mapper, streams)
@@ -153,8 +153,8 @@ class Breeder(Generic[P]):
 
     def _without_duplicates(
         self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
-    ) -> Bred[P]:
-        """Draw individuals, and draw those again that are duplicates, as often as the settings say."""
+    ) -> Offspring[P]:
+        """Draw individuals, and replace duplicates, as often as the settings allow."""
         self._phenotypes.turn()
         genomes, parents, changed = draw(0)
         phenotypes = self._phenotypes.read(genomes)
@@ -168,13 +168,13 @@ class Breeder(Generic[P]):
             genomes[again], parents[again], changed[again] = (each[again] for each in drawn)
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
-        return Bred(genomes, phenotypes, parents, changed)
+        return Offspring(genomes, phenotypes, parents, changed)
 
 
 def _duplicates(
     phenotypes: list[Phenotype[P] | None], n_elites: int, simulated: Callable[[bytes], bool]
 ) -> list[int]:
-    """Return the individuals, elites apart, that are no program or one seen before."""
+    """Return the individuals, except elites, without a program or with one seen before."""
     seen: set[bytes] = set()
     found = []
     for i, phenotype in enumerate(phenotypes):
