@@ -5,7 +5,7 @@
 >>> gecar.simulate(run.program, course="hairpin", robot="ev3")
 >>> gecar.discover("recordings/monday")
 
-Whatever is asked for is imported then: ``import gecar`` alone is quick.
+Modules are imported when they are used, so that ``import gecar`` alone is fast.
 """
 
 from importlib import import_module
@@ -28,7 +28,7 @@ _PLACES = {
     "read_program": "gecar.language.program",
     "read_recording": "gecar.reality.recordings.recording",
 }
-"""What stands at the top, and where it comes from; `gecar/__init__.pyi` has the same for type checkers."""
+"""Public names and their modules; `gecar/__init__.pyi` lists them for type checkers."""
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """gecar from Python: evolve, simulate and discover as one call each, with names, files or objects.
 
-They stand at the top: ``gecar.evolve``, ``gecar.simulate``, ``gecar.discover``. A notebook shows what they return.
+They are exported as ``gecar.evolve``, ``gecar.simulate``, ``gecar.discover``. Notebooks display what they return.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ class Simulation(Displayed):
     world
         Robot, course, and settings.
     program
-        What drove.
+        The program.
     drive
-        What came of it, with its trace.
+        The drive, with its trace.
     """
 
     world: World
@@ -69,7 +69,7 @@ class Simulation(Displayed):
 
     @cached_property
     def arrives(self) -> Mapping[str, Any]:
-        """How the program arrives in 200 drives under drawn conditions; see `gecar.results.arrival.arrives`."""
+        """How the program arrives in 200 drives under random conditions; see `gecar.results.arrival.arrives`."""
         return arrives(self.world, self.program, 1)
 
 
@@ -86,9 +86,9 @@ class Run(Displayed):
     world
         Robot, course, and settings of the simulation.
     seed
-        The run's.
+        Random seed of the run.
     folder
-        Where its files are, or None.
+        Folder of its files, or None.
     """
 
     best: Best[Program]
@@ -114,7 +114,7 @@ class Run(Displayed):
 
     @cached_property
     def simulation(self) -> Simulation:
-        """The best program's drive, as the run scored it."""
+        """The drive of the best program, as it was scored in the run."""
         seed = noise_seed(self.seed, self.program)
         return Simulation(
             self.world, self.program, drive_program(self.world, self.program.opcodes, seed, trace=True)
@@ -136,29 +136,29 @@ def evolve(
     out: str | Path | None = None,
     tell: Tell = lambda generation: None,  # noqa: ARG005
 ) -> Run:
-    """Evolve a program that drives a robot round a course.
+    """Evolve a program that drives a robot around a course.
 
     Parameters
     ----------
     course, grammar, robot
         Names, files, or objects.
     fitness
-        What a drive is worth, by default its time to GOAL (eq. 1): a function of a `gecar.world.rollout.Drive` with
-        its trace. Less is better; 0 or more; 10,000 or more, or nan, is a drive that failed. Drives are then simulated
-        one at a time in this thread, about 2 ms each.
+        Fitness of a drive, by default its time to GOAL (eq. 1): a function of a `gecar.world.rollout.Drive` with its
+        trace that returns 0 or more. Lower is better; 10,000 or more, or nan, is a failed drive. Drives are then
+        simulated one at a time in this thread, about 2 ms each.
     settings
-        A preset's name; or what differs from preset ``better``, by name, as in config.toml; or `Settings`.
+        A preset's name; or the settings that differ from preset ``better``, by name, as in config.toml; or `Settings`.
     seed
         Random seed.
     workers
-        Number of threads; default: one a core. It does not change the result.
+        Number of threads; default: one per core. It does not change the result.
     noise_pct, motor_noise_pct
         Noise of each sensor reading [%], and of each command's strength [% of it].
     time_limit_s
-        When a drive without GOAL ends [s].
+        Time after which a drive without GOAL ends [s].
     out
-        A new folder for what ``gecar evolve`` writes; by default nothing is written. It needs names or files, and
-        eq. 1, for the run has to go on from what the folder says.
+        A new folder for the files of ``gecar evolve``; by default nothing is written. Then course, grammar and robot
+        must be names or files, and the fitness eq. 1, because a run is resumed from its folder.
     tell
         Called with each generation's record.
 
@@ -202,18 +202,18 @@ def simulate(
     seed: int = 1,
     time_limit_s: float = 60.0,
 ) -> Simulation:
-    """Drive a program in the simulation.
+    """Simulate a drive of a program.
 
     Parameters
     ----------
     program
-        A program, its text, its file, or a run, whose best program drives.
+        A program, its text, its file, or a run, which stands for its best program.
     course, robot
         Names, files, or objects.
     noise_pct, motor_noise_pct, seed
         Noise of each sensor reading [%], of each command's strength [% of it], and its seed.
     time_limit_s
-        When a drive without GOAL ends [s].
+        Time after which a drive without GOAL ends [s].
 
     Raises
     ------
@@ -238,26 +238,26 @@ def discover(
     workers: int | None = None,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
 ) -> Verdict:
-    """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
+    """Find the physics that a simulation lacks, fit it, and judge it on held-out recordings.
 
     Parameters
     ----------
     recordings
-        A folder of recordings of one robot, a recording's file, or what was read.
+        A folder of recordings of one robot, a recording's file, or recordings that were read.
     holdout
-        Names of the recordings to set aside; default: every fourth, or the last part of the only one.
+        Names of the held-out recordings; default: every fourth, or the last part of a single one.
     robot
         The robot as it is known: a name, a file or an object; default: what the recordings name.
     program
-        Whose time of arrival tells sizes, too.
+        Program whose arrival time is used to report sizes, too.
     material
-        From what size on something is material.
+        Smallest size that is material.
     invent
-        Whether a law is written for what no effect explains; default: where what is left is material.
+        Whether a law is written for an error that no effect explains; default: if that error is material.
     seed
         Random seed.
     workers
-        Threads; default: one a core.
+        Number of threads; default: one per core.
     tell
         Called with a line of progress.
 
@@ -310,7 +310,11 @@ def _evolve_into(
     if objects:
         raise expected("out", f"a {next(iter(objects))} made in Python", "its name or its file")
     if fitness is not None:
-        raise expected("out", "a fitness of your own", "none, for a run that a folder can tell")
+        raise expected(
+            "out",
+            "a fitness of your own",
+            "none: a run is resumed from its folder, which cannot hold a function",
+        )
     started = start(config, out)
     finish(started, tell)
     evolution = started.evolution

@@ -1,10 +1,10 @@
-"""What a notebook shows: runs, drives, courses, recordings and verdicts by themselves, as pictures and words.
+"""Display in notebooks: runs, drives, courses, recordings and verdicts, as pictures and text.
 
 from gecar.notebook import discover, plot, read_case, show
 verdict = discover(read_case("recordings/monday"))
-verdict                # words, tables and the gap; print(show(verdict)): the words alone
+verdict                # text, tables and the gap; print(show(verdict)): only the text
 plot(verdict, "map")   # or "gap", "where", "traces", "tried": a matplotlib figure
-verdict.robot          # the robot with what was found
+verdict.robot          # the robot with the effects found
 """
 
 from __future__ import annotations
@@ -50,22 +50,22 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Shown:
-    """A verdict as words for a terminal, and as HTML for a notebook."""
+    """A verdict as text for a terminal, and as HTML for a notebook."""
 
     text: str
     html: str
 
     def __str__(self) -> str:
-        """Return the words."""
+        """Return the text."""
         return self.text
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
+        """Return the HTML for a notebook."""
         return self.html
 
 
 def show(verdict: Verdict) -> Shown:
-    """Return a verdict's words, tables, and the picture of how much of the gap is closed."""
+    """Return a verdict's text, tables, and the picture of how much of the gap is closed."""
     gap = {"gap": picture(plot(verdict, "gap"))}
     return Shown("\n\n".join(words(verdict)), verdict_html(verdict, gap))
 
@@ -86,7 +86,7 @@ def plot(verdict: Verdict, name: str = "gap") -> Figure:
 
 @singledispatch
 def html(thing: object) -> str:
-    """Return what a notebook shows of a course, a recording, a verdict, a drive, a run, or a run's best.
+    """Return the HTML of a course, a recording, a verdict, a drive, a run, or a run's best.
 
     Raises
     ------

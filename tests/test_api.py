@@ -112,7 +112,7 @@ def test_discover_refuses_no_recordings():
 def test_a_notebook_shows_drives_runs_and_courses():
     shown = gecar.simulate(PROGRAM)._repr_html_()
     assert "<img alt='The paper&#x27;s course: GOAL in" in shown
-    assert "drives under fresh conditions" in shown
+    assert "drives under random conditions" in shown
     run = gecar.evolve(settings=SMALL)
     assert "<img" in run._repr_html_()
     assert "<pre>" in run.best._repr_html_()

@@ -106,7 +106,7 @@ def test_the_papers_search_says_how_its_winner_fares(gecar, short):
     told = read_result(Path("new"))["arrives"]
     assert set(told) == {"share", "of", "median_s", "p95_s", "steps"}
     assert (told["of"], len(told["steps"])) == (200, 5)
-    assert f"Of 200 drives under fresh conditions {percent(told['share'])} arrive" in ended.out
+    assert f"Of 200 drives under random conditions {percent(told['share'])} arrive" in ended.out
     assert "steps of 4 to 0.25 ms it arrives" in ended.out
 
 

@@ -236,7 +236,7 @@ def test_a_real_motor_is_predicted_within_a_hundredth() -> None:
 def test_a_notebook_shows_a_verdict_in_words_tables_and_pictures() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     assert "commands act late" in str(notebook.show(verdict))
-    assert "<img alt='The gap on recordings set aside'" in notebook.show(verdict)._repr_html_()
+    assert "<img alt='The gap on held-out recordings'" in notebook.show(verdict)._repr_html_()
     assert notebook.plot(verdict, "tried").get_axes()
     with pytest.raises(InputError, match="picture: found 'nonsense', expected one of gap, where"):
         notebook.plot(verdict, "nonsense")

@@ -133,7 +133,7 @@ def test_an_effect_of_the_size_of_its_limit_is_found(nothing, effect: str, label
 def test_of_a_sensor_that_read_nothing_nothing_is_known(nothing) -> None:
     assert nothing.limits["sensor_delay"] is None
     assert nothing.as_json()["limits"]["sensor_delay"] is None
-    assert "sensor_delay" in " ".join(words(nothing)).split("say nothing: ")[1]
+    assert "sensor_delay" in " ".join(words(nothing)).split("cannot show: ")[1]
     assert not nothing.residual.material
 
 

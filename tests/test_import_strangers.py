@@ -383,7 +383,7 @@ def test_speeds_tell_whether_full_duty_was_capped(tmp_path, dps_at_100, cap):
         texts.append(text_of(("t", "duty", "angle"), (t, np.full(len(t), duty), angle)))
     found = import_all(tmp_path, *texts, setup=BENCH)
     assert [each.recording.setup.duty_cap for each in found] == [cap] * 3
-    assert any("duties reach 100 %, beyond the 80 % that robot ev3" in line for line in found[0].guesses)
+    assert any("duties reach 100 %, beyond the cap of robot ev3" in line for line in found[0].guesses)
 
 
 def test_a_full_power_bench_without_a_cap_of_its_own_is_warned_of(gecar, tmp_path):
@@ -392,9 +392,7 @@ def test_a_full_power_bench_without_a_cap_of_its_own_is_warned_of(gecar, tmp_pat
         text = text_of(("t_s", "left_duty_pct", "left_angle_deg"), (t, np.full(len(t), duty), angle))
         (tmp_path / f"step_{duty:.0f}.csv").write_text(text)
         (tmp_path / f"step_{duty:.0f}.toml").write_text('rig = "bench"\n')
-    said = (
-        "warning: duties reach 100 %, beyond the 80 % that robot ev3 is capped at; wheels turn faster beyond"
-    )
+    said = "warning: duties reach 100 %, beyond the cap of robot ev3, 80 %; wheels turn faster beyond"
     assert said in gecar("compare", "step_40.csv", "step_100.csv", "--no-picture").out
     (tmp_path / "step_100.toml").write_text('rig = "bench"\nduty_cap = 1.0\n')
     assert "warning" not in gecar("compare", "step_40.csv", "step_100.csv", "--no-picture").out

@@ -121,7 +121,8 @@ def test_a_robot_that_is_full_of_laws_gets_no_more_than_fit(own):
 def test_a_law_is_told_in_words_numbers_and_pictures():
     verdict = verdict_on(SAG)
     assert (
-        sentences(verdict)[0] == "Missing in the simulation, and in no list: a battery that sags under load."
+        sentences(verdict)[0]
+        == "Missing in the simulation, and not in the catalogue: a battery that sags under load."
     )
     (table,) = json.loads(json.dumps(verdict.as_json()["invented"]))
     assert (table["port"], table["variables"], table["unit"]) == ("supply_voltage", ["draw"], "V")

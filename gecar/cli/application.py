@@ -71,7 +71,9 @@ def reflowed(text: str) -> str:
 
 
 COMMANDS = (
-    CommandEntry("evolve", EVOLVE, "Evolve a program that drives the robot round a course.", "evolve:evolve"),
+    CommandEntry(
+        "evolve", EVOLVE, "Evolve a program that drives the robot around a course.", "evolve:evolve"
+    ),
     CommandEntry("simulate", EVOLVE, "Simulate a program's drive; draw or film it.", "simulate:simulate"),
     CommandEntry("plot", EVOLVE, "Redraw a run's pictures, or compare several runs.", "plot:plot"),
     CommandEntry(
@@ -82,13 +84,15 @@ COMMANDS = (
     CommandEntry("robot", COURSES, "List, show and make robots.", "robot:robot"),
     CommandEntry("grammar", COURSES, "List, check and derive from grammars.", "grammar:grammar"),
     CommandEntry("export", ROBOT, "Write a program as main.py for the brick.", "export:export"),
-    CommandEntry("import", ROBOT, "Make recordings from the logs people have on disk.", "import_:import_"),
-    CommandEntry("motor", ROBOT, "Draw motor speed over speed and duty commands: Figs 7, 8.", "motor:motor"),
+    CommandEntry("import", ROBOT, "Convert logs of robots and cameras to recordings.", "import_:import_"),
+    CommandEntry(
+        "motor", ROBOT, "Plot motor speed against speed and duty commands: Figs 7, 8.", "motor:motor"
+    ),
     CommandEntry(
         "compare", ROBOT, "Compare simulation and recordings: Tables 6, 7, Figs 9, 10.", "compare:compare"
     ),
-    CommandEntry("calibrate", ROBOT, "Fit the robot's own constants to recordings.", "calibrate:calibrate"),
-    CommandEntry("discover", ROBOT, "Find the physics missing in the simulation.", "discover:discover"),
+    CommandEntry("calibrate", ROBOT, "Fit the robot's constants to recordings.", "calibrate:calibrate"),
+    CommandEntry("discover", ROBOT, "Find the physics that the simulation lacks.", "discover:discover"),
     CommandEntry("effects", ROBOT, "List the effects that discover can find.", "effects:effects"),
 )
 
@@ -123,7 +127,7 @@ class Commands(TyperGroup):
 
 @contextmanager
 def _ctrl_c_answered() -> Iterator[None]:
-    """End on Ctrl-C with a word and without a traceback, before typer ends without either."""
+    """End on Ctrl-C with one word and no traceback; typer would print neither."""
     try:
         yield
     except KeyboardInterrupt:
@@ -146,11 +150,11 @@ def _root(
 
     [bold]Start here[/]
 
-      gecar evolve             a program for the paper's course, and pictures
-      gecar simulate runs/...  drive it again, or film it
-      gecar course list        where else to drive
+      gecar evolve             evolve a program for the paper's course, with pictures
+      gecar simulate runs/...  simulate its drive again, or film it
+      gecar course list        list the other courses
 
-    Every command explains itself: [bold]gecar evolve --help[/]
+    Every command has help: [bold]gecar evolve --help[/]
     """
 
 

@@ -1,1 +1,1 @@
-"""Calls on other processes and machines: executors, workers' start and end, and whole calls side by side."""
+"""Calls on other processes and machines: executors, start and end of workers, calls in parallel."""

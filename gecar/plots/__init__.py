@@ -1,1 +1,1 @@
-"""Pictures made from results."""
+"""Pictures of results."""

@@ -1,1 +1,1 @@
-"""Problems of the field beside the robot: phenotypes and fitnesses to study Grammatical Evolution with."""
+"""Benchmark problems of Grammatical Evolution other than the robot: phenotypes and fitnesses."""

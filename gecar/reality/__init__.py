@@ -1,1 +1,1 @@
-"""Recordings of a real robot: what the simulation makes of them, and what it lacks."""
+"""Recordings of a real robot, compared with the simulation: calibration, and discovery of missing physics."""

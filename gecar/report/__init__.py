@@ -1,1 +1,1 @@
-"""Words and tables made from results."""
+"""Results as text and tables."""

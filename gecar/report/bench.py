@@ -20,7 +20,10 @@ def bench_lines(found: BenchGap) -> list[str]:
         f"Off by {_mean(found):.1f} deg (root mean square, mean of {_count(found)}); most in {worst.trial}: "
         f"{worst.rms_deg:.1f} deg, {worst.end_deg:+.1f} deg at its end."
     )
-    lines = ["A bench: the recorded commands, replayed open loop, beside the shafts' angles.", apart]
+    lines = [
+        "On the bench, recorded commands are replayed open loop and compared with the shafts' angles.",
+        apart,
+    ]
     measured, simulated = np.array([shaft.speeds_dps for shaft in found.shafts]).T
     moved = np.abs(measured) > 1.0
     if moved.any():

@@ -10,7 +10,7 @@ from gecar.reality.verdict import Misfit
 
 
 def calibration_lines(result: Calibration) -> list[str]:
-    """Say what was fitted, what the recordings cannot determine, and the misfit on recordings set aside."""
+    """Say what was fitted, what the recordings cannot determine, and the misfit on held-out recordings."""
     lines = [fitted_line(fitted) for fitted in result.fitted]
     lines += [
         f"{u.constant.name} stays {_number(u.nominal, u.constant.unit)}: {u.why}."
@@ -22,7 +22,7 @@ def calibration_lines(result: Calibration) -> list[str]:
         lines.append(f"Not identifiable, {BLIND.replace(' it', ' them')}: {blind}.")
     if result.channels:
         where = (
-            "the part set aside" if result.by_time else f"the recordings set aside ({', '.join(result.held)})"
+            "the held-out part" if result.by_time else f"the held-out recordings ({', '.join(result.held)})"
         )
         lines.append(f"NRMSE on {where}, before and after: {channels_words(result)}.")
     if result.worse:
@@ -31,8 +31,8 @@ def calibration_lines(result: Calibration) -> list[str]:
         )
     if result.unexplained:
         lines.append(
-            f"Constants do not explain the misfit in {', '.join(result.unexplained)}: physics is missing that "
-            "the robot's constants do not describe. `gecar discover` looks for it."
+            f"Constants do not explain the misfit in {', '.join(result.unexplained)}: the simulation lacks "
+            "physics that these constants do not describe. `gecar discover` searches for it."
         )
     return lines
 
@@ -48,7 +48,7 @@ def fitted_line(fitted: FittedConstant) -> str:
 
 
 def channels_words(result: Calibration) -> str:
-    """Return the misfits on what was set aside, column by column."""
+    """Return the misfits on the held-out recordings, column by column."""
     return ", ".join(f"{name} {m.before:.4f} -> {m.after:.4f}" for name, m in result.channels.items())
 
 

@@ -18,23 +18,23 @@ PAPER_BEST_S = 16.74
 
 
 def title_of(drive: Drive, course: Course, share: float | None) -> str:
-    """Say in a few words what came of a drive, and in which share of drives its program arrives."""
+    """Return a title: how a drive ended, and the share of drives in which its program arrives."""
     came = "GOAL in" if drive.outcome == Outcome.GOAL else f"{drive.outcome.sentence} after"
     return f"{course.title or course.name}: {came} {with_share(drive.time_s, share)}"
 
 
 def sentence_of(drive: Drive) -> str:
-    """Say in one sentence what came of a drive."""
+    """Say in one sentence how a drive ended."""
     if drive.outcome == Outcome.GOAL:
         return f"The robot reached GOAL through all checkpoints in {drive.time_s:.2f} s."
     return f"The robot {drive.outcome.sentence} after {drive.time_s:.2f} s."
 
 
 def arrival_of(arrives: Mapping[str, Any]) -> str:
-    """Say in a sentence or two how a program arrives under fresh conditions and at other steps, from result.json."""
+    """Say how a program arrives under random conditions and at other steps, from result.json."""
     if not arrives["of"]:
         return "There is no program to drive under other conditions."
-    words = f"Of {arrives['of']} drives under fresh conditions {percent(arrives['share'])} arrive"
+    words = f"Of {arrives['of']} drives under random conditions {percent(arrives['share'])} arrive"
     if arrives["median_s"] is not None:
         words += f", in {arrives['median_s']:.2f} s (median; 95 % of these within {arrives['p95_s']:.2f} s)"
     return f"{words}. {_steps_of(arrives['steps'])}"

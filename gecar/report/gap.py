@@ -50,7 +50,7 @@ def _simulated(found: Gap) -> str:
 
 
 def gap_title(found: Gap) -> str:
-    """Say in a few words what is compared, and the gap in time where there is one."""
+    """Return a title: what is compared, and the gap in time if there is one."""
     where = (found.course.title or found.course.name) if found.course else "Blank floor"
     errors = [t.error_pct for t in found.trials if not math.isnan(t.error_pct)]
     if len(errors) < len(found.trials) and any(t.arrived for t in found.trials):

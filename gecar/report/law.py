@@ -9,17 +9,17 @@ _UNITS = {variable.id: variable.unit for variable in VARIABLES}
 
 
 def law_sentence(law: Invented) -> str:
-    """Say a law: what it looks like, what it is, where it is known, and what it could be besides."""
+    """Return a law in words: what it resembles, its formula, where it is known, and its alternatives."""
     words = f"{law.looks_like[0].upper()}{law.looks_like[1:]}: {law.term.typeset}"
     words += f" ({_constants(law)}). It moves the robot by {_moved(law)}."
     known = ", ".join(
         f"{name} from {low:.3g} to {high:.3g}{_unit(name)}" for name, (low, high) in law.range.items()
     )
     if known:
-        words += f" It is known for {known}; beyond, it is a guess."
+        words += f" It was tested for {known}; beyond that it is an extrapolation."
     if law.alternatives:
         others = " or ".join(dict.fromkeys(f"{BY_PORT[t.port].title}, {t.typeset}" for t in law.alternatives))
-        words += f" These recordings can not tell it from {others}."
+        words += f" These recordings cannot distinguish it from {others}."
     return words
 
 

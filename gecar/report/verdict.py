@@ -1,4 +1,4 @@
-"""A verdict in words a student understands."""
+"""A verdict in plain words."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ CHANNEL_WORDS = {
 }  # fmt: skip
 _CHANNELS = {column: column.rsplit("_", 1)[0] for column in COLUMNS}
 _UNITS = {"m": (1e3, "mm"), "deg": (1.0, "deg"), "dps": (1.0, "deg/s"), "v": (1.0, "V"), "pct": (1.0, "%")}
-FAILS = "The proof fails: on recordings set aside, the simulation is further off with what was found than without it."
+FAILS = "The test fails: on held-out recordings the error is larger with what was found than without it."
 MOST_NAMED = 3  # causes in a headline; the list has all
 _WORSE = 1.05  # times what it was off by before: a channel that was made worse
 
 
 def words(verdict: Verdict) -> list[str]:
-    """Say a verdict, and what the recordings could have shown, a sentence or two a paragraph."""
+    """Return a verdict, and what the recordings could have shown, in paragraphs of a sentence or two."""
     return [*sentences(verdict), *limits(verdict)]
 
 
 def sentences(verdict: Verdict) -> list[str]:
-    """Say a verdict, a sentence or two a paragraph; a proof that failed comes first."""
+    """Return a verdict in paragraphs of a sentence or two; a failed test comes first."""
     out = [title(verdict)]
     if verdict.found:
         out.append(failure(verdict) if verdict.judgement.failed else _proof(verdict))
@@ -39,14 +39,14 @@ def sentences(verdict: Verdict) -> list[str]:
         named = "; ".join(
             f"{BY_ID[m.id].title} ({m.id}), which {does(m.size, verdict)}" for m in verdict.minor
         )
-        out.append(f"Visible, and too small to matter; it could be: {named}.")
+        out.append(f"Visible, but too small to be material; possibly: {named}.")
     if verdict.found and not verdict.residual.material and not verdict.judgement.failed:
-        out.append(f"What is left {does(verdict.residual.size, verdict)}, which does not matter.")
+        out.append(f"The remaining error {does(verdict.residual.size, verdict)}, which is not material.")
     if verdict.residual.material or verdict.verdict.endswith("unexplained"):
         out.append(unexplained(verdict))
     if verdict.located:
         out.append(
-            "Where simulation and reality part: " + "; ".join(_place(p) for p in verdict.located[:3]) + "."
+            "Where simulation and reality differ: " + "; ".join(_place(p) for p in verdict.located[:3]) + "."
         )
     out += list(verdict.notes)
     out.append(f"Next recording: {verdict.next_recording.why}.")
@@ -54,28 +54,28 @@ def sentences(verdict: Verdict) -> list[str]:
 
 
 def title(verdict: Verdict) -> str:
-    """Say in a sentence what is missing; where the proof fails, that first."""
+    """Say in one sentence what is missing; if the test failed, say that first."""
     if verdict.judgement.failed:
         found = " and ".join([*([_names(verdict)] if verdict.effects else []), *_laws(verdict)])
-        return f"{FAILS} What was found, and is not to be relied on: {found}."
+        return f"{FAILS} Found, but not reliable: {found}."
     return _headline(verdict)
 
 
 def failure(verdict: Verdict) -> str:
-    """Say by how much a robot found is further off than the robot as it was."""
+    """Say by how much the error of the robot found exceeds that of the robot before."""
     worse = [
         _was_now(verdict, column, misfit, short=True)
         for column, misfit in verdict.judgement.channels.items()
         if misfit.after > _WORSE * misfit.before
     ]
-    return f"On {set_aside(verdict)}, root mean square, with what was found and without: {', '.join(worse)}."
+    return f"Errors on {set_aside(verdict)}, root mean square, with what was found and without: {', '.join(worse)}."
 
 
 def set_aside(verdict: Verdict) -> str:
-    """Name what was set aside."""
+    """Name the held-out recordings."""
     judged = verdict.judgement
     if judged.by_time:
-        return "the part set aside"
+        return "the held-out part"
     return f"recordings not used for the fit ({', '.join(judged.recordings)})"
 
 
@@ -98,11 +98,11 @@ def _headline(verdict: Verdict) -> str:
     return {
         "nothing": _nothing(verdict),
         "missing": f"Missing in the simulation: {names}.",
-        "invented": f"Missing in the simulation, and in no list: {laws}.",
-        "missing_and_invented": f"Missing in the simulation: {names}; and, in no list, {laws}.",
-        "unexplained": "Something is missing, and nothing in the catalogue explains it.",
+        "invented": f"Missing in the simulation, and not in the catalogue: {laws}.",
+        "missing_and_invented": f"Missing in the simulation: {names}; and, not in the catalogue, {laws}.",
+        "unexplained": "Something is missing, and no effect of the catalogue explains it.",
         "missing_and_unexplained": (
-            f"Missing in the simulation: {names}; and something that nothing in the catalogue explains."
+            f"Missing in the simulation: {names}; and something that no effect of the catalogue explains."
         ),
     }[verdict.verdict]
 
@@ -110,8 +110,8 @@ def _headline(verdict: Verdict) -> str:
 def _nothing(verdict: Verdict) -> str:
     left = verdict.residual
     if left.white:
-        return "Nothing is missing: the simulation follows these recordings down to the sensors' noise."
-    return f"Nothing material is missing: what is left {does(left.size, verdict)}, and does not matter."
+        return "Nothing is missing: the simulation matches these recordings to within the sensors' noise."
+    return f"Nothing material is missing: the remaining error {does(left.size, verdict)}."
 
 
 def moves(size: Size, verdict: Verdict) -> str:
@@ -146,14 +146,14 @@ def on_bench(verdict: Verdict) -> bool:
 
 
 def limits(verdict: Verdict) -> list[str]:
-    """Say which sizes would have been seen, and of what nothing is known, a sentence each."""
+    """Say which sizes would have been found, and which effects these recordings cannot show, a sentence each."""
     seen = [f"{e} {_above_limit(e, each, verdict)}" for e, each in verdict.limits.items() if each]
     unseen = [e for e, each in verdict.limits.items() if not each]
     out = []
     if seen:
-        out.append(f"Not found, and seen in 95 of 100 cases if there: {', '.join(seen)}.")
+        out.append(f"Not found; in 95 of 100 cases these sizes would have been: {', '.join(seen)}.")
     if unseen:
-        out.append(f"Of these these recordings say nothing: {', '.join(unseen)}.")
+        out.append(f"These recordings cannot show: {', '.join(unseen)}.")
     return out
 
 
@@ -174,12 +174,12 @@ def _effect(found: Found, verdict: Verdict) -> str:
         f"It {does(found.size, verdict)}."
     )
     if found.alternatives:
-        words += f" These recordings can not tell it from {' or '.join(found.alternatives)}."
+        words += f" These recordings cannot distinguish it from {' or '.join(found.alternatives)}."
     return words
 
 
 def sizes_of(found: Found | Minor, verdict: Verdict) -> list[str]:
-    """Say an effect's parameters, in units people use where the robot as it was is known."""
+    """Return an effect's parameters, in practical units where the robot before is known."""
     if verdict.evidence is None:
         return [f"{label} {_interval(i)}" for label, i in found.parameters.items()]
     return [str(q) for q in quantities(found.id, found.parameters, verdict.evidence.before)]
@@ -198,7 +198,7 @@ def _proof(verdict: Verdict) -> str:
     }
     where = set_aside(verdict)
     if not gaps:
-        return f"Judged on {where}, where every channel shows noise alone."
+        return f"Judged on {where}, where every channel shows only noise."
     closed = verdict.judgement.gap_closed
     share = "" if closed is None or closed < 0.0 else f" {closed:.0%} of the gap is closed:"
     return (
@@ -207,7 +207,7 @@ def _proof(verdict: Verdict) -> str:
 
 
 def _was_now(verdict: Verdict, column: str, misfit: Misfit, short: bool = False) -> str:
-    """Say what a column was off by, is off by now, and would be by noise alone."""
+    """Say the error of a column before and now, and that of noise alone."""
     name = CHANNEL_WORDS[_CHANNELS[column]]
     was, now, noise = in_units(column, misfit)
     if short:
@@ -221,7 +221,7 @@ def _was_now(verdict: Verdict, column: str, misfit: Misfit, short: bool = False)
 
 
 def in_units(column: str, misfit: Misfit) -> tuple[str, str, str]:
-    """Say what a column was off by, is off by now, and would be by noise alone, root mean square."""
+    """Return the error of a column before and now, and that of noise alone, root mean square."""
     if math.isnan(misfit.deviation):
         return f"{misfit.before:.3f}", f"{misfit.after:.3f}", f"{misfit.floor:.3f}"
     factor, unit = _UNITS[column.rsplit("_", 1)[1]]
@@ -234,16 +234,16 @@ def in_units(column: str, misfit: Misfit) -> tuple[str, str, str]:
 
 
 def unexplained(verdict: Verdict) -> str:
-    """Say what is left that nothing explains."""
+    """Describe the error that no effect explains."""
     shown = verdict.located[0] if verdict.located else None
-    words = f"Nothing explains what is left: it {does(verdict.residual.size, verdict)}."
+    words = f"No effect explains the remaining error: it {does(verdict.residual.size, verdict)}."
     if shown is not None:
-        words += f" It shows most in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
+        words += f" It is largest in {CHANNEL_WORDS.get(shown.channel, shown.channel)}, {shown.regime}."
     if verdict.residual.formula:
-        words += f" This describes it, and is no cause: {verdict.residual.formula}."
+        words += f" A formula describes it, without giving a cause: {verdict.residual.formula}."
     if verdict.residual.described:
         gains = ", ".join(f"{c} {_change(m)}" for c, m in verdict.residual.described.items())
-        words += f" Added to the replays, it brings the NRMSE on what was set aside from {gains}."
+        words += f" Added to the replays, it changes the NRMSE on the held-out recordings from {gains}."
     return words
 
 

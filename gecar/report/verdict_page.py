@@ -1,4 +1,4 @@
-"""A verdict as HTML: what a pupil sees first, and what stands below it, up to the statistics, folded away."""
+"""A verdict as HTML: the first screen, the findings below it, and the statistics in a collapsed section."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ text-align:left;border-bottom:1px solid #D8DEE4;vertical-align:top;overflow-wrap
 @media (max-width:560px){.verdict .bar{grid-template-columns:minmax(0,1fr) 5rem}.verdict .bar span{grid-column:1/3}}
 """
 _CAPTIONS = {
-    "gap": "The gap on recordings set aside", "where": "In what motion", "traces": "Measured, before and after",
-    "map": "At what place", "tried": "What was tried, and what it leaves", "law": "The law that was written",
+    "gap": "The gap on held-out recordings", "where": "In which motion", "traces": "Measured, before and after",
+    "map": "At which place", "tried": "Candidates, and the error each leaves", "law": "The law that was written",
 }  # fmt: skip
 NO_TABLES: Mapping[str, str] = MappingProxyType({})
 _KINDS = {PLACE: "", WHEELS: " of a wheel's turn", READING: " of a reading"}
@@ -72,7 +72,7 @@ def verdict_html(verdict: Verdict, pictures: Mapping[str, bytes]) -> str:
 
 
 def first_screen(verdict: Verdict, shown: Sequence[Beside]) -> str:
-    """Return what a pupil sees first: one sentence, and one number where recordings beside simulations are given."""
+    """Return the first screen: one sentence, and one number if recordings with their simulations are given."""
     parts = [f"<p class='soft'>{_text(verdict.case)}</p>", f"<h1>{_text(title(verdict))}</h1>"]
     if verdict.judgement.failed:
         parts.append(f"<p class='fails'>{_text(failure(verdict))}</p>")
@@ -82,7 +82,7 @@ def first_screen(verdict: Verdict, shown: Sequence[Beside]) -> str:
 
 
 def the_number(verdict: Verdict, shown: Sequence[Beside]) -> str:
-    """Return, as HTML, what the simulation was off by in a typical recording set aside, and is now."""
+    """Return, as HTML, the simulation's error in a typical held-out recording, before and now."""
     measure = measure_of(verdict) if shown else ""
     run = typical(shown, measure)
     if run is None:
@@ -122,7 +122,7 @@ def _turned(run: Beside, measure: str, verdict: Verdict) -> str:
 def article(
     verdict: Verdict, made: Sequence[Choice] = (), tables: Mapping[str, str] = NO_TABLES, shown: str = ""
 ) -> str:
-    """Return what stands below: what was found, why that and nothing else, what to record next, and how it was found.
+    """Return what follows: what was found, the other candidates, what to record next, and how it was found.
 
     Parameters
     ----------
@@ -159,19 +159,19 @@ def _found(verdict: Verdict) -> str:
         cards = [_card(found, verdict) for found in verdict.effects] + [_law(law) for law in verdict.invented]
         parts.append("<h2>What was found</h2>" + "".join(cards))
     if verdict.residual.material or verdict.verdict.endswith("unexplained"):
-        parts.append(f"<h2>What is left</h2><p>{_text(unexplained(verdict))}</p>")
+        parts.append(f"<h2>The remaining error</h2><p>{_text(unexplained(verdict))}</p>")
     if verdict.minor:
         rows = "".join(f"<li>{_one(minor, verdict)}</li>" for minor in verdict.minor)
-        parts.append(f"<h2>Visible, and too small to matter</h2><ul>{rows}</ul>")
+        parts.append(f"<h2>Visible, but too small to be material</h2><ul>{rows}</ul>")
     notes = "".join(f"<li>{_text(note)}</li>" for note in verdict.notes)
-    return "".join(parts) + (f"<h2>Good to know</h2><ul>{notes}</ul>" if notes else "")
+    return "".join(parts) + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
 
 
 def _card(found: Found, verdict: Verdict) -> str:
     doubt = ""
     if found.alternatives:
         others = " or ".join(BY_ID[other].title for other in found.alternatives)
-        doubt = f"<p>These recordings can not tell it from: {_text(others)}.</p>"
+        doubt = f"<p>These recordings cannot distinguish it from: {_text(others)}.</p>"
     return (
         f"<h3>{_text(_capital(BY_ID[found.id].title))}</h3><p>{_one(found, verdict, named=False)}</p>{doubt}"
     )
@@ -194,14 +194,14 @@ def _one(found: Found | Minor, verdict: Verdict, named: bool = True) -> str:
 
 
 def _why(made: Sequence[Choice]) -> str:
-    """Return what winners and runners-up leave, as bars."""
+    """Return the errors that chosen effects and runners-up leave, as bars."""
     if not made:
         return ""
     taken = any(rival.taken for choice in made for rival in choice.rivals)
-    parts = [f"<h2>{'Why this, and nothing else' if taken else 'Why nothing in the catalogue'}</h2>"]
+    parts = [f"<h2>{'Compared with other effects' if taken else 'Effects of the catalogue'}</h2>"]
     parts.append(
-        "<p class='soft'>What the simulation is off by on recordings set aside (root mean square), "
-        "with each candidate fitted in turn: short is good.</p>"
+        "<p class='soft'>The simulation's error on held-out recordings (root mean square), "
+        "with each candidate fitted in turn: shorter is better.</p>"
     )
     parts += [_bars(choice, len(made) == 1) for choice in made]
     rows = [["choice", "candidate", "left", "unit", "taken"]]
@@ -222,7 +222,7 @@ def _bars(choice: Choice, alone: bool) -> str:
     most = max(left for *_, left in bars) or 1.0
     parts = []
     if winner and not alone:
-        parts.append(f"<h3>{_text(_capital(BY_ID[winner.effect].title))}, beside the others</h3>")
+        parts.append(f"<h3>{_text(_capital(BY_ID[winner.effect].title))}, compared with the others</h3>")
     for kind, name, left in sorted(bars, key=lambda bar: -bar[2]):
         parts.append(
             f"<div class='bar {kind}'><span>{_text(name)}</span><i style='width:{100.0 * left / most:.1f}%'></i>"
@@ -230,7 +230,8 @@ def _bars(choice: Choice, alone: bool) -> str:
         )
     if winner and winner.left >= choice.before:
         parts.append(
-            "<p class='soft'>At the end of these it does not help: it was taken for what it gains before.</p>"
+            "<p class='soft'>At the end of these recordings it does not help; "
+            "it was chosen for what it gains earlier.</p>"
         )
     faint = [rival for rival in choice.rivals if rival not in choice.telling]
     if faint:
@@ -239,14 +240,12 @@ def _bars(choice: Choice, alone: bool) -> str:
         leaves = f"{BY_ID[best.effect].title}, leaves {amount(best.left, unit)}"
         parts.append(f"<p class='soft'>{_text(words)}, {_text(leaves)}.</p>")
     elif choice.tried > len(choice.rivals):
-        parts.append(
-            f"<p class='soft'>{choice.tried - len(choice.rivals)} more candidates promised less.</p>"
-        )
+        parts.append(f"<p class='soft'>{choice.tried - len(choice.rivals)} more candidates gained less.</p>")
     return "".join(parts)
 
 
 def _how(verdict: Verdict, tables: Mapping[str, str], shown: str) -> str:
-    """Return the statistics, folded away."""
+    """Return the statistics, in a collapsed section."""
     judged = [
         [
             CHANNEL_WORDS[name.rsplit("_", 1)[0]],
@@ -269,14 +268,16 @@ def _how(verdict: Verdict, tables: Mapping[str, str], shown: str) -> str:
     gap = "" if closed is None or verdict.verdict == "nothing" else f" Gap closed: {closed:.2f}."
     judged_on = f"Judged on {set_aside(verdict)}; fitted on {', '.join(verdict.fitted_on)}.{gap}"
     size = does(verdict.residual.size, verdict)
-    left = f"What is left {white} for white noise (p = {verdict.residual.p:.3g}), and {size}."
+    left = f"The remaining error {white} for white noise (p = {verdict.residual.p:.3g}), and {size}."
     heads = ["channel", "before", "now", "noise alone", "NRMSE before", "now", "noise alone"]
     links = " · ".join(_csv_link(name, text, f"{name}.csv") for name, text in tables.items())
     parts = [
-        _table("Off on recordings set aside: whole replays, open loop, root mean square", heads, judged),
+        _table("Error on held-out recordings: whole replays, open loop, root mean square", heads, judged),
         f"<p class='soft'>{_text(judged_on)} {_text(left)}</p>",
-        _table("Evidence", ["effect", "gain, set aside", "largest gain by chance (95 %)", "p"], evidence),
-        _table("Where it shows", ["channel", "motion", "share", "p", "recording", "times [s]"], places),
+        _table("Evidence", ["effect", "gain, held out", "largest gain by chance (95 %)", "p"], evidence),
+        _table(
+            "Where the error occurs", ["channel", "motion", "share", "p", "recording", "times [s]"], places
+        ),
         shown,
         "".join(f"<p>{_text(line)}</p>" for line in limits(verdict)),
         f"<p>Data behind the pictures: {links}</p>" if links else "",

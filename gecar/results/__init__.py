@@ -1,1 +1,1 @@
-"""A run's folder: its configuration, history, best program, provenance, and the checkpoint it goes on from."""
+"""A run's folder: configuration, history, best program, provenance, and the checkpoint for resuming."""

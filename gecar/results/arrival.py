@@ -1,4 +1,4 @@
-"""How programs arrive under fresh conditions, and the share that does, as it stands beside every time to GOAL."""
+"""How programs arrive under random conditions, and the share that does, as it stands beside every time to GOAL."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Programs for the robot: fitness, arrival under drawn conditions, evaluation."""
+"""The evolution of robot programs: fitness, arrival under random conditions, evaluation."""

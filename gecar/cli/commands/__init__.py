@@ -1,1 +1,1 @@
-"""Commands: their options and help; one module each, which imports nothing slow."""
+"""Commands: options and help; one module each, without slow imports."""

@@ -1,4 +1,4 @@
-"""``gecar calibrate``: fit the robot's own constants to recordings."""
+"""``gecar calibrate``: fit the robot's constants to recordings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def calibrate(
     ] = Path("calibrated"),
     holdout: Annotated[
         str, typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
-                          help="Recordings to set aside for validation, separated by commas."),
+                          help="Held-out recordings, for validation, separated by commas."),
     ] = "",
     robot: Annotated[
         str, typer.Option("--robot", metavar="NAME|FILE", show_default="what the recordings name",

@@ -13,7 +13,7 @@ from gecar.cli.output import JsonOption, Output
 def check(
     table: Annotated[
         Path | None,
-        typer.Argument(metavar="TABLE.toml", help="The fitness table; --update fills in rows without figures.",
+        typer.Argument(metavar="TABLE.toml", help="Fitness table; --update fills in rows without figures.",
                        show_default="benchmarks/fitness_table.toml, here or beside gecar"),
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the new figures to the table.")] = False,
@@ -26,16 +26,16 @@ def check(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Run a table of fitness figures again: prints what moved and by how much, and exits 1 if anything did.
+    """Rerun a table of fitness figures, report changes, and exit with 1 if there are any.
 
-    With the versions the table names, figures must be equal, on any machine. With others, drives may move by 1 %, a
-    search's median over its seeds by 15 %, and one of its seeds may gain or lose GOAL.
+    With the library versions named in the table, figures must be equal on any machine. With other versions, times of
+    drives may change by 1 %, the median of a search by 15 %, and one of its seeds may gain or lose GOAL.
 
     [bold]Examples[/]
 
       gecar check
       gecar check --update
-      gecar check my_study.toml                         a table of your own; gecar's own shows the form
+      gecar check my_study.toml                         your own table, in the form of gecar's
       gecar check --pins > pins.txt && pip install -r pins.txt
     """
     from gecar.parallel.executors import prepare_workers

@@ -31,7 +31,7 @@ def compare(
     program: Annotated[
         Path | None,
         typer.Option("--program", metavar="FILE", show_default="what the recordings name",
-                     help="The program that drove, or a run folder. Without one, the recorded commands are replayed."),
+                     help="Program or run folder that gave the commands; without it, recorded commands are replayed."),
     ] = None,
     course: CourseOption = None,
     robot: RobotOption = None,
@@ -46,9 +46,9 @@ def compare(
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Compare simulation and recordings: arrival times, paths, displacement, correlation, misfit of each channel.
+    """Compare simulation and recordings: arrival times, paths, displacement, correlation, error of each channel.
 
-    Of recordings from a bench: how far simulated shafts turn beside the measured ones, and how fast.
+    For recordings from a bench: angles and speeds of simulated and measured shafts.
 
     [bold]Examples[/]
 

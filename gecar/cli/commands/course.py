@@ -122,7 +122,7 @@ def print_out(
     ] = None,
     no_guides: Annotated[bool, typer.Option("--no-guides", help="Leave out tiles, START and GOAL.")] = False,
     only_line: Annotated[
-        bool, typer.Option("--only-line", help="Print the line and nothing else, on the sheets it crosses.")
+        bool, typer.Option("--only-line", help="Print only the line, on the sheets it crosses.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -166,7 +166,7 @@ def new(
     ] = 0.30,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a course file to begin with: a loop with every field explained, to be edited by hand.
+    """Write a template for a course: a loop, with every field explained.
 
     [bold]Example[/]
 

@@ -18,7 +18,7 @@ def discover(
     cases: Annotated[
         list[Path],
         typer.Argument(metavar="CASE...", show_default=False,
-                       help="Folders, each with recordings of one robot; or a recording."),
+                       help="Folders, each with recordings of one robot; or one recording."),
     ],
     out: Annotated[
         Path,
@@ -28,7 +28,7 @@ def discover(
     holdout: Annotated[
         str,
         typer.Option("--holdout", metavar="NAMES", show_default="every fourth",
-                     help="Recordings to set aside for validation, separated by commas."),
+                     help="Held-out recordings, for validation, separated by commas."),
     ] = "",
     robot: Annotated[
         str,
@@ -66,22 +66,22 @@ def discover(
     ] = None,
     invent: Annotated[
         bool | None,
-        typer.Option("--invent/--no-invent", show_default="where something material is left unexplained",
-                     help="Write a law for what no effect explains, and make it a part of the robot."),
+        typer.Option("--invent/--no-invent", show_default="where a material error remains unexplained",
+                     help="Write a law for the error that no effect explains, and add it to the robot."),
     ] = None,
     physics: Annotated[
         str,
-        typer.Option("--physics", metavar="FILE", help="The language laws are written in, as BNF."),
+        typer.Option("--physics", metavar="FILE", help="Grammar of the laws (BNF)."),
     ] = "physics",
     without: Annotated[
         str,
         typer.Option("--without", metavar="EFFECTS", show_default=False,
-                     help="Effects that shall not be found, with commas between: what law would be written instead?"),
+                     help="Effects to leave out of the catalogue, separated by commas."),
     ] = "",
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Find which physics the simulation left out, fit it, and prove it on recordings set aside.
+    """Find the physics that the simulation lacks, fit it, and test it on held-out recordings.
 
     [bold]Examples[/]
 

@@ -27,10 +27,10 @@ def effects(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the physics a simulation may have left out.
+    """List the effects that a simulation may lack.
 
-    Each is a group of parameters with neutral values at which it vanishes. A robot file has a section for each
-    effect of its robot; the verdict of [bold]gecar discover[/] names them.
+    Each effect is a group of parameters. At their neutral values it vanishes. A robot file has a section for each
+    effect of the robot; [bold]gecar discover[/] finds effects.
 
     [bold]Examples[/]
 

@@ -35,7 +35,7 @@ def export(
         typer.Option("--out", metavar="FOLDER", help="Output folder.", show_default="brick"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    left_motor: Annotated[str, _port("left-motor", "A to D; -B if it is mounted the other way round.")] = "B",
+    left_motor: Annotated[str, _port("left-motor", "A to D; -B if the motor is mounted in reverse.")] = "B",
     right_motor: Annotated[str, _port("right-motor", "A to D, likewise.")] = "C",
     sensor: Annotated[str, _port("sensor", "1 to 4: SensorValue.")] = "3",
     left_sensor: Annotated[str, _port("left-sensor", "1 to 4: LeftSensorValue.")] = "2",
@@ -44,8 +44,8 @@ def export(
 ) -> None:  # fmt: skip
     """Write a program as main.py for the brick.
 
-    The program stands in it as Python to read and change. On the brick it asks for the sensor's calibration,
-    starts on a button, keeps to its times, stops after 60 s or on a button, and logs the run for gecar import.
+    The file contains the program as readable Python. On the brick it asks for the sensor's calibration, starts when a
+    button is pressed, stops after 60 s or when a button is pressed, and writes a log for gecar import.
 
     [bold]Examples[/]
 

@@ -62,9 +62,9 @@ def list_grammars(as_json: JsonOption = False) -> None:
 
 @grammar.command()
 def check(name: GrammarArgument, as_json: JsonOption = False) -> None:
-    """Check a grammar, and say what is in it.
+    """Check a grammar and list its contents.
 
-    Every nonterminal must be defined and able to end in text; those that nothing reaches are named.
+    Every nonterminal must be defined and must derive some text. Unreachable ones are listed.
     """
     from gecar.language.grammar import load_grammar
 

@@ -20,26 +20,26 @@ if TYPE_CHECKING:
     from gecar.reality.recordings.importing.logs import Imported
     from gecar.reality.recordings.setup import Setup
 
-FILES, CAMERA, RUN = "What the files hold", "The camera", "What the recording is of"
+FILES, CAMERA, RUN = "Contents of the files", "Camera", "The recording"
 
 
 def import_(
     logs: Annotated[
         list[Path],
         typer.Argument(metavar="LOG...", show_default=False,
-                       help="Robots' logs, each of one run or several; and cameras' logs of these runs."),
+                       help="Robot logs, each with one or more runs, and camera logs of these runs."),
     ],
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILE|FOLDER",
-                     help="The recording (.csv; a .toml goes beside it), or where recordings go.",
+                     help="Output file (.csv; a .toml is written beside it), or output folder.",
                      show_default="recordings/LOG.csv"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a recording that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing recordings.")] = False,
     column: Annotated[
         list[str] | None,
         typer.Option("--column", metavar="NAME=COLUMN[:UNIT]", rich_help_panel=FILES, show_default=False,
-                     help="What a column is, where the guess is wrong: lm=left_angle_deg:rad; speed=- passes it over."),
+                     help="Meaning of a column, if the guess is wrong: lm=left_angle_deg:rad; speed=- ignores it."),
     ] = None,
     constant: Annotated[
         list[str] | None,
@@ -49,32 +49,32 @@ def import_(
     names: Annotated[
         str | None,
         typer.Option("--names", metavar="A,B,...", rich_help_panel=FILES, show_default=False,
-                     help="The columns' names, for a file that has none."),
+                     help="Column names, for a file without them."),
     ] = None,
     command: Annotated[
         list[str] | None,
         typer.Option("--command", metavar="[COLUMN=]FORMULA", rich_help_panel=FILES, show_default=False,
-                     help='A command that was not logged, as a formula of the time t [s]: "100*sin(2*pi*t)".'),
+                     help='A command that was not logged, as a formula of the time t in seconds: "100*sin(2*pi*t)".'),
     ] = None,
     counts: Annotated[
         float | None,
         typer.Option("--counts", metavar="N", rich_help_panel=FILES, show_default=False,
-                     help="Counts of the encoders per turn of a wheel, where they count no degrees."),
+                     help="Encoder counts per wheel turn, if the encoders do not count degrees."),
     ] = None,
     run: Annotated[
         int | None,
-        typer.Option("--run", metavar="N", rich_help_panel=FILES, help="Which run, where a file holds several.",
+        typer.Option("--run", metavar="N", rich_help_panel=FILES, help="Run to import, if a file holds several.",
                      show_default="all, each a recording"),
     ] = None,
     one_clock: Annotated[
         bool,
         typer.Option("--one-clock", rich_help_panel=FILES,
-                     help="All files are of one run, timed by one clock, such as topics of a ROS bag."),
+                     help="All files belong to one run with one clock, such as the topics of a ROS bag."),
     ] = False,
     offset: Annotated[
         float | None,
         typer.Option("--offset", metavar="S", rich_help_panel=CAMERA, show_default="found from motion",
-                     help="What to add to the camera's times, in seconds."),
+                     help="Offset added to the camera's times, in seconds."),
     ] = None,
     scale: Annotated[
         float | None,
@@ -83,40 +83,40 @@ def import_(
     ] = None,
     origin: Annotated[
         str, typer.Option("--origin", metavar="X,Y", rich_help_panel=CAMERA,
-                          help="The course's lower left corner as the camera has it, in its unit."),
+                          help="The course's lower left corner in the camera's frame, in its unit."),
     ] = "0,0",
     turn: Annotated[
         float, typer.Option("--turn", metavar="DEG", rich_help_panel=CAMERA,
-                            help="How far the camera's x axis is turned counter-clockwise from the course's."),
+                            help="Counter-clockwise angle from the course's x axis to the camera's."),
     ] = 0.0,
     y_down: Annotated[
         bool | None,
         typer.Option("--y-down/--y-up", rich_help_panel=CAMERA, show_default="by the encoders",
-                     help="Which way the camera's y axis points."),
+                     help="Direction of the camera's y axis."),
     ] = None,
     clockwise: Annotated[
         bool | None,
         typer.Option("--clockwise/--counter-clockwise", rich_help_panel=CAMERA, show_default="by the encoders",
-                     help="Which way the camera's headings count."),
+                     help="Direction in which the camera's headings increase."),
     ] = None,
     heading_zero: Annotated[
         float | None,
         typer.Option("--heading-zero", metavar="DEG", rich_help_panel=CAMERA, show_default="from motion",
-                     help="The heading the camera gives a robot that faces along its x axis."),
+                     help="Heading that the camera reports for a robot facing along its x axis."),
     ] = None,
     mark: Annotated[
         str, typer.Option("--mark", metavar="AHEAD,LEFT", rich_help_panel=CAMERA,
-                          help="Where the mark is on the robot, from the axle's centre, in metres."),
+                          help="Position of the mark on the robot, from the axle's centre, in metres."),
     ] = "0,0",
     place: Annotated[
-        bool, typer.Option("--place", rich_help_panel=CAMERA, help="Move and turn the path to start on START."),
+        bool, typer.Option("--place", rich_help_panel=CAMERA, help="Move and turn the path to begin at START."),
     ] = False,
     robot: Annotated[
         str, typer.Option("--robot", metavar="NAME|FILE", rich_help_panel=RUN,
-                          help="Who drove; of a motor alone a file with motor, battery and drive will do."),
+                          help="Robot; for a single motor, a file with motor, battery and drive."),
     ] = "ev3",
     course: Annotated[
-        str, typer.Option("--course", metavar="NAME|FILE|none", rich_help_panel=RUN, help="Where; none: blank floor."),
+        str, typer.Option("--course", metavar="NAME|FILE|none", rich_help_panel=RUN, help="Course, or none."),
     ] = "paper",
     duty_cap: Annotated[
         float | None,
@@ -125,22 +125,22 @@ def import_(
                      show_default="by the wheels' speeds, or the robot's"),
     ] = None,
     bench: Annotated[
-        bool, typer.Option("--bench", rich_help_panel=RUN, help="Wheels in the air, or one motor alone."),
+        bool, typer.Option("--bench", rich_help_panel=RUN, help="Wheels in the air, or a single motor."),
     ] = False,
     program: Annotated[
         Path | None,
         typer.Option("--program", metavar="FILE", rich_help_panel=RUN, show_default=False,
-                     help="The program that drove."),
+                     help="Program that gave the commands."),
     ] = None,
-    notes: Annotated[str, typer.Option("--notes", rich_help_panel=RUN, help="Anything else.")] = "",
+    notes: Annotated[str, typer.Option("--notes", rich_help_panel=RUN, help="Notes to keep with the recording.")] = "",
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Make recordings from the logs people have on disk.
+    """Convert logs of robots and cameras to recordings.
 
-    Reads text (Pybricks DataLogs, Arduino's and other terminals' output, Tracker's exports, cameras' tables, ROS topics
-    as CSV), MATLAB files up to version 7, and Excel workbooks. Guesses columns, units and axes, and says what it took;
-    aligns the camera's clock by motion; mends what is safe to mend, with a line each, and refuses the rest with a
-    reason. Every run in a file becomes a recording.
+    Reads text (Pybricks DataLogs, output of Arduino and other terminals, Tracker exports, camera tables, ROS topics as
+    CSV), MATLAB files up to version 7, and Excel workbooks. Columns, units and axes are guessed and reported. The
+    camera's clock is aligned by motion. Damage that is safe to repair is repaired, with a line each; other damage is
+    refused with a reason. Every run in a file becomes a recording.
 
     [bold]Examples[/]
 
@@ -221,7 +221,7 @@ def _targets(out: Path | None, names: Sequence[str]) -> list[Path]:
 
 
 def _tell(output: Output, imported: Sequence[Imported], targets: Sequence[Path]) -> None:
-    """Say what was guessed, mended and written; what holds for all recordings, once."""
+    """Report what was guessed, repaired and written; what applies to all recordings, once."""
     found = []
     told: set[str] = set()
     for each, target in zip(imported, targets, strict=True):

@@ -15,7 +15,7 @@ def motor(
     benches: Annotated[
         list[Path] | None,
         typer.Argument(metavar="FOLDER", show_default=False,
-                       help="Recordings of motors on a bench, a folder for each motor."),
+                       help="Recordings of motors on a bench, one folder per motor."),
     ] = None,
     robot: RobotOption = None,
     out: Annotated[

@@ -11,7 +11,7 @@ from gecar.cli.output import JsonOption, Output
 from gecar.errors import expected
 
 RunsArgument = Annotated[
-    list[Path], typer.Argument(metavar="RUN", help="Folders that gecar evolve made.", show_default=False)
+    list[Path], typer.Argument(metavar="RUN", help="Run folders, made by gecar evolve.", show_default=False)
 ]
 
 
@@ -26,13 +26,13 @@ def plot(
         typer.Option(
             "--out",
             metavar="FOLDER",
-            help="Output folder for the pictures, also for those given a name.",
+            help="Output folder for all pictures.",
             show_default="the run, or here",
         ),
     ] = None,
     tree: Annotated[
         Path | None,
-        _file("--tree", "Draw only the pictures named: the best program's derivation; .png, .pdf or .svg."),
+        _file("--tree", "Draw only the named pictures: the best program's derivation; .png, .pdf or .svg."),
     ] = None,
     genealogy: Annotated[Path | None, _file("--genealogy", "... its ancestors; .png, .pdf or .svg.")] = None,
     evolution: Annotated[
@@ -40,16 +40,14 @@ def plot(
     ] = None,
     page: Annotated[
         bool,
-        typer.Option(
-            "--html", help="Also write drive.html: the drive as a page that plays it, for a classroom."
-        ),
+        typer.Option("--html", help="Also write drive.html, a page that plays the drive, for a classroom."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Draw a run's pictures, or compare several runs.
 
     One run: convergence, and the best program's drive, derivation and genealogy. Runs that differ only in their seed
-    are drawn as one: median and interquartile range.
+    are drawn together: median and interquartile range.
 
     [bold]Examples[/]
 

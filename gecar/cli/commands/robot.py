@@ -55,7 +55,7 @@ def show(
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Show a robot's file: every constant, its unit, and where it comes from.
+    """Show a robot's file: every constant, its unit, and its source.
 
     [bold]Example[/]
 
@@ -73,14 +73,14 @@ def show(
 @robot.command()
 def new(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Where to write it: NAME.toml.", show_default=False)
+        Path, typer.Argument(metavar="FILE", help="File to write, NAME.toml.", show_default=False)
     ],
     like: Annotated[
-        str, typer.Option("--like", metavar="NAME|FILE", help="The robot whose file it begins with.")
+        str, typer.Option("--like", metavar="NAME|FILE", help="Robot whose file is copied.")
     ] = "ev3",
     as_json: JsonOption = False,
 ) -> None:
-    """Write a robot file to begin with: every constant with its unit and source, to be edited by hand.
+    """Write a template for a robot: every constant with its unit and source.
 
     [bold]Example[/]
 

@@ -74,7 +74,7 @@ def simulate(
     ] = 1.0,
     page: Annotated[
         Path | None,
-        typer.Option("--html", metavar="FILE", help="Write the drive as a page that plays it, for a classroom.",
+        typer.Option("--html", metavar="FILE", help="Write a page that plays the drive, for a classroom.",
                      show_default=False, rich_help_panel=PICTURES),
     ] = None,
     record: Annotated[

@@ -52,7 +52,7 @@ def _errors(axes: Axes, shafts: tuple[Shaft, ...]) -> None:
             at, words = (shaft.t_s[-1], shaft.end_deg), f"{shaft.trial} {shaft.end_deg:+.0f}"
             axes.annotate(words, at, (4, 0), textcoords="offset points", size=7, va="center", color=SOFT)
     axes.axhline(0.0, color=INK, linewidth=0.8)
-    axes.set(xlabel="time [s]   (dark: full duty, light: little)", ylabel="[deg]")
+    axes.set(xlabel="time [s]   (dark: full duty, light: low duty)", ylabel="[deg]")
     axes.set_xlim(left=0.0)
     axes.margins(x=0.16)
     axes.set_xlim(left=0.0)

@@ -47,7 +47,7 @@ def calibration_figure(result: Calibration) -> Figure:
 
 
 def _doubtful(result: Calibration) -> list[UnknownConstant]:
-    """Return what the recordings feel, but do not tell."""
+    """Return the constants that affect these recordings but cannot be determined from them."""
     return [unknown for unknown in result.unknown if unknown.why != BLIND]
 
 

@@ -52,16 +52,16 @@ def motor_speed(
         _limit(left, cap_pct, float(regulated.speed_deg_s.max()))
         left.plot(*_xy(regulated), "o-", color=BLUE, markersize=5, label="simulated")
         left.set(
-            xlabel="speed input [%]",
+            xlabel="speed command [%]",
             ylabel="speed [deg/s]",
-            title="Told a speed: 10 deg/s per percent (Fig. 7)",
+            title="Speed command: 10 deg/s per percent (Fig. 7)",
         )
         _limit(right, cap_pct, float(powered.speed_deg_s.max()))
         right.plot(*_xy(uncapped), color=SKY, linestyle=":", label="simulated, without the cap")
         right.plot(*_xy(powered), "o-", color=BLUE, markersize=5, label="simulated")
         for (name, curve), colour, marker in zip(bench.items(), _COLOURS, "s^Dvx*", strict=False):
             right.plot(*_xy(curve), linestyle="none", marker=marker, color=colour, markersize=5, label=name)
-        right.set(xlabel="power: share of the supply [%]", title="Told a power (Fig. 8)")
+        right.set(xlabel="duty: share of the supply [%]", title="Duty command (Fig. 8)")
         right.tick_params(labelleft=True)
         for axes in (left, right):
             axes.legend(loc="upper left")

@@ -176,5 +176,5 @@ def _draw_floor(axes: Axes, course: Course, without: _Drive, with_it: _Drive) ->
         aspect="equal",
         xlabel="x [m]",
         ylabel="y [m]",
-        title="The axle's way",
+        title="Path of the axle",
     )

@@ -111,7 +111,7 @@ def _csv(rows: list[list[Any]]) -> str:
 
 
 def gap_figure(verdict: Verdict) -> Figure:
-    """Draw each channel's misfit on the recordings set aside: before, after, and what noise leaves."""
+    """Draw each channel's misfit on the held-out recordings: before, after, and that of noise alone."""
     channels = verdict.judgement.channels
     names = list(channels)
     figure = new_figure(8.0, 2.2 + 0.5 * len(names))
@@ -176,7 +176,7 @@ def _density(where: object, channel: int, mask: npt.NDArray[np.bool_]) -> float:
 
 
 def tried_figure(verdict: Verdict, told: Told | None = None) -> Figure:
-    """Draw what each candidate leaves on the recordings set aside, choice by choice, beside what nothing leaves."""
+    """Draw the error each candidate leaves on the held-out recordings, choice by choice, and the error without any."""
     made = (told or tell(verdict)).choices[:MOST_CHOICES]
     rows = [len(choice.telling) + 1 for choice in made]
     figure = new_figure(8.6, 1.6 + 0.3 * sum(rows) + 0.5 * len(rows))
@@ -205,11 +205,11 @@ def tried_figure(verdict: Verdict, told: Told | None = None) -> Figure:
             figure.add_subplot().set_axis_off()
         others = "; what takes nothing away is left out"
         detail = (
-            f"on recordings set aside, each fitted in turn; blue: taken{others}"
+            f"on held-out recordings, each fitted in turn; blue: chosen{others}"
             if made
             else "nothing stood out"
         )
-        headline(figure, "What was tried, and what it leaves", detail)
+        headline(figure, "Candidates, and the error each leaves", detail)
     return figure
 
 

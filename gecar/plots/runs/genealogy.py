@@ -45,7 +45,7 @@ Share = Callable[[Member], float | None]
 
 @dataclass(frozen=True)
 class Step:
-    """A generation in which the winner's line got another program.
+    """A generation in which the winner's ancestors got another program.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def _draw_line(axes: Axes, lineage: Lineage, winner: Member, ranks: Ranks) -> No
     line = lineage.line(winner)
     x, y = zip(*(_at(member, ranks) for member in line), strict=True)
     axes.plot(x, y, color=PAPER, linewidth=4.2)
-    axes.plot(x, y, color=VERMILION, linewidth=2.2, label="the winner's line")
+    axes.plot(x, y, color=VERMILION, linewidth=2.2, label="the winner's line of descent")
     for bit, name in OPERATORS.items():
         points = [_at(member, ranks) for member in line if lineage.changed(member) & bit]
         if points:
@@ -224,7 +224,7 @@ def _draw_line(axes: Axes, lineage: Lineage, winner: Member, ranks: Ranks) -> No
                 **style,
             )
     if any(len(places) > 1 for places in lineage.family(winner)):
-        axes.plot([], [], color=INK, linewidth=0.7, label="others it descends from")
+        axes.plot([], [], color=INK, linewidth=0.7, label="other ancestors")
     axes.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 

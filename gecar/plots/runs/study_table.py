@@ -163,7 +163,7 @@ def _label(panels: npt.NDArray[Any], rows: list[str], columns: list[str], names:
 def _explain(axes: Axes, paper: bool) -> None:
     lines = [
         mpl.lines.Line2D([], [], color=BLUE, linewidth=2.2, label="median"),
-        mpl.patches.Patch(color=BLUE, alpha=0.15, label="middle half"),
+        mpl.patches.Patch(color=BLUE, alpha=0.15, label="interquartile range"),
         mpl.lines.Line2D([], [], color=SOFT, linewidth=0.7, label="each run"),
     ]
     if paper:

@@ -1,1 +1,1 @@
-"""Notes beside a verdict, and the recording to make next."""
+"""Notes of a verdict, and the recording to make next."""

@@ -17,7 +17,6 @@ from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.selection.thresholds import TOLD_APART
 from gecar.reality.verdict import Found, Invented, NextRecording
 from gecar.world.course.course import Course, load_course
 from gecar.world.robot import Robot
@@ -28,6 +27,7 @@ Commands = tuple[tuple[float, float, float], ...]
 
 ROW_S = 0.01
 START = (1.2, 0.6, 0.0)  # m, m, rad, where there is no course
+LEAST_DIFFERENCE = 9.0  # squared standard deviations: less does not distinguish two robots
 
 
 def _holds(length_s: float, *duties: tuple[float, float]) -> Commands:
@@ -84,7 +84,7 @@ def suggest(
         confused = next(f for f in found if f.alternatives)
         others = " and ".join(confused.alternatives)
         name, apart = _telling(robot, rivals[0], like, noise)
-        if apart < TOLD_APART:
+        if apart < LEAST_DIFFERENCE:
             words = f"{name}: no sequence of the library distinguishes {confused.id} from {others} with these sensors"
             return NextRecording(words, LIBRARY[name])
         return NextRecording(f"{name}: distinguishes {confused.id} from {others}", LIBRARY[name])
@@ -118,7 +118,7 @@ def _about_laws(robot: Robot, laws: Sequence[Invented], like: Recording, noise: 
     else:
         law, other = doubtful.term, doubtful.alternatives[0]
         name, apart = _telling(robot, _with_law(robot, law, other), like, noise)
-        told = "distinguishes" if apart >= TOLD_APART else "no sequence of the library distinguishes"
+        told = "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
         why = f"{told} a law at {law.port} from one at {other.port}"
     return NextRecording(f"{name}: {why}", LIBRARY[name])
 

@@ -30,27 +30,25 @@ def notes_on(
         Effects accepted on the recordings fitted on, and not confirmed by those set aside.
     """
     notes = [
-        f"{effect} explains the recordings it was fitted to, but is not confirmed by those set aside, or its interval "
+        f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
         "contains its neutral value: a candidate, not a finding."
         for effect in candidates
     ]
     if split.by_time:
         notes.append(
-            "Only one recording: its last part was set aside, so validation uses later times of the same run."
+            "There is only one recording: its last part was held out, so validation uses later times of the same run."
         )
     if clocks_fitted:
         late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
-        notes.append(
-            f"The camera's clock was late by {late} ms in the recordings: corrected, and no effect of the robot."
-        )
+        notes.append(f"The camera's clock was late by {late} ms in the recordings. This was corrected.")
     if doubted:
         notes.append(
-            "Readings are right on even floor and wrong near lines, and neither the sensor nor the line explains it: "
-            "look at the camera's path, and how the sensor is mounted."
+            "Readings are right on uniform floor and wrong near lines, and no effect of sensor or line explains it: "
+            "check the camera's path and the mounting of the sensor."
         )
     measured = {name for r in split.fitted for name in r.measured}
     if not {"x_m", "heading_rad"} & measured:
-        notes.append("No pose was recorded: effects that only a camera shows were not tested.")
+        notes.append("No pose was recorded: effects that only a camera can show were not tested.")
     located = [_start(run) for run in fitted.recordings if run.nuisances.start is not None]
     if located:
         notes.append(

@@ -1,1 +1,1 @@
-"""A robot's own constants fitted to recordings."""
+"""Fits of a robot's constants to recordings."""

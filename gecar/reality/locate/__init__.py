@@ -1,1 +1,1 @@
-"""Where simulation and reality part: by channel, regime of motion, time, and place on the floor."""
+"""Where simulation and reality differ: by channel, regime of motion, time, and place on the floor."""

@@ -1,1 +1,1 @@
-"""What the sensors' noise alone does to recordings, and what residuals hold beyond it."""
+"""Noise of the sensors, estimated from recordings, and the energy of residuals in excess of it."""

@@ -1,1 +1,1 @@
-"""Minimisers that know nothing of robots: robust least squares, and CMA-ES where the landscape is rough."""
+"""General minimisers: robust least squares, and CMA-ES for rough cost functions."""

@@ -1,1 +1,1 @@
-"""What a robot found is worth on recordings it was not fitted to, and whether what is left is noise."""
+"""Tests of a robot found on held-out recordings, and of the remaining residuals for whiteness."""

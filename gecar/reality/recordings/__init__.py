@@ -1,1 +1,1 @@
-"""Recordings of a real robot: read, written, imported from other tools' logs, and set aside for judging."""
+"""Recordings of a real robot: reading, writing, importing logs, and holding out recordings for validation."""

@@ -70,15 +70,15 @@ def guess_cap(recordings: Sequence[Recording], robot: Robot) -> tuple[float | No
     most = 100.0 * max((float(np.abs(r.commands).max(initial=0.0)) for r in recordings), default=0.0)
     if most <= cap + _LEAST_ABOVE_PCT or robot.drive.mode == "speed":
         return None, ""
-    reach = f"duties reach {most:.3g} %, beyond the {cap:.3g} % that robot {robot.name} is capped at"
+    reach = f"duties reach {most:.3g} %, beyond the cap of robot {robot.name}, {cap:.3g} %"
     speeds = settled_speeds(recordings)
     above = np.array([point for point in speeds if point[0] > cap + _LEAST_ABOVE_PCT])
     if not len(above):
         bench = recordings[0].setup.rig == "bench"
         told = (
-            "on a bench, taken as not capped"
+            "on a bench: assumed not capped"
             if bench
-            else "none was held long enough to tell: taken as capped"
+            else "none was held long enough to decide: assumed capped"
         )
         return (1.0 if bench else None), f"{reach}; {told}"
     below = np.array([point for point in speeds if 0.25 * cap <= point[0] <= cap])

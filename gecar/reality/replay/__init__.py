@@ -1,1 +1,1 @@
-"""Recorded commands replayed through the simulation, and the paths and readings that follow from them."""
+"""Replays of recorded commands through the simulation, with the resulting paths and readings."""

@@ -1,1 +1,1 @@
-"""Measured less simulated, whitened: of the motion, and of the colour sensor along the measured path."""
+"""Whitened residuals, measured minus simulated, of the motion and of the colour sensor along the measured path."""

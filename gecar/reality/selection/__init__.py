@@ -1,1 +1,1 @@
-"""Which effects of the catalogue the recordings ask for: screening, stepwise selection, cross-validation."""
+"""Selection of effects from the catalogue: screening, stepwise selection, cross-validation."""

@@ -125,13 +125,6 @@ DISC_SHARE = Threshold(
     "hand",
 )
 
-# -- The next recording
-TOLD_APART = Threshold(
-    9.0,
-    "squared standard deviations by which a recording must differ to distinguish two robots",
-    "three sigma",
-)
-
 
 def table() -> tuple[tuple[str, Threshold], ...]:
     """Return every threshold with its name."""

@@ -1,1 +1,1 @@
-"""Where on a course a recording without a camera began, found from what its colour sensor read."""
+"""The start pose of a recording without a camera, estimated from the readings of its colour sensor."""

@@ -1,1 +1,1 @@
-"""Intervals of what was fitted."""
+"""Intervals of fitted parameters, and detection limits."""

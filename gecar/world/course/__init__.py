@@ -1,1 +1,1 @@
-"""Courses: files, tiles, floor, driving order, and how fast they can be driven."""
+"""Courses: files, tiles, floor, driving order, and lower bounds on the time to GOAL."""

@@ -1,1 +1,1 @@
-"""What is compiled: the robot's physics, its sensors, the interpreter, and drives made of them."""
+"""Compiled code: the robot's physics, its sensors, the interpreter, and whole drives."""

@@ -1,1 +1,1 @@
-"""What people have on disk, made into recordings: read, guess, repair, join."""
+"""Logs converted to recordings: read, guess, repair, join."""
