@@ -10,6 +10,7 @@ from linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
 from scipy.signal import lfilter
 
 from gecar.reality.noise.excess_energy import Blocks
+from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import stepwise
@@ -73,6 +74,23 @@ def test_a_step_that_fits_noise_gains_nothing_on_recordings_left_out() -> None:
     assert step.gain >= 0.0
     assert left_out_gains(problem.estimator, step).sum() < 1.0
     assert judged(problem, step).p > 0.05
+
+
+@pytest.mark.parametrize("least", [-1.0, 0.02])
+def test_a_fold_is_judged_at_coordinates_fitted_to_the_others(least: float) -> None:
+    rng = np.random.default_rng(0)
+    a, folds = rng.normal(size=(60, 3)), np.repeat([0, 1, 2], 20)
+    a[:40, 2] *= 1e-9  # only the last fold determines the third
+    y = 0.01 * rng.normal(size=60)
+    z, bounds = np.linalg.lstsq(a, y, rcond=None)[0], (np.full(3, -9.0), np.full(3, 9.0))
+    minimum = Minimum(z, y - a @ z, cost(y - a @ z))
+    found = left_out_costs(minimum, -a, bounds, lambda v: y - v @ a.T, folds, least)
+    for k in range(3):
+        rest, columns = folds != k, 2 if k == 2 and least > 0.0 else 3
+        without = np.linalg.lstsq(a[rest, :columns], y[rest], rcond=None)[0]
+        expected = cost(y[~rest] - a[~rest, :columns] @ without)
+        assert found[k] == pytest.approx(expected, rel=1e-3) or (k == 2 and least < 0.0)
+    assert np.isfinite(found).all()
 
 
 def test_the_null_distribution_is_the_largest_of_several_chi_squares() -> None:

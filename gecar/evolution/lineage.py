@@ -26,10 +26,9 @@ CROSSOVER, MUTATION, CREEP, DUPLICATION = 1, 2, 4, 8
 INDIVIDUAL = np.dtype(
     [("parent", "<i4"), ("mate", "<i4"), ("merit", "<f4"), ("changed", "u1"), ("codons", "<i4")]
 )
-"""``parent``, ``mate``: places in the generation before, as in `gecar.evolution.reproduction.Offspring`. ``merit``: time
-to GOAL [s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: the operators that changed its program,
-`CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`.
-``codons``: bytes kept of its codons, one each unless they
+"""``parent``, ``mate``: places in the generation before, as in `gecar.evolution.reproduction.Offspring`. ``merit``:
+time to GOAL [s], or 10^4 to 10^4 + 2, see `gecar.evolution.scores.merits`. ``changed``: the operators that changed its
+program, `CROSSOVER` | `MUTATION` | `CREEP` | `DUPLICATION`. ``codons``: bytes kept of its codons, one each unless they
 are larger; none if nothing changed it."""
 
 MAX_BYTES = 32_000_000

@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.invent.search import Law, Library
-from gecar.reality.optimisation.least_squares import costs, jacobian, weights
+from gecar.reality.optimisation.least_squares import costs, jacobian, left_out_costs
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 
 Array = npt.NDArray[np.float64]
 
 DRAWS = 500
-RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -53,25 +52,12 @@ def left_out_gains(library: Library, law: Law) -> Array:
     blocks = library.problem.estimator.blocks
     free, z, errors = law.parameters, law.minimum.z, law.minimum.errors
     residual = library.problem.estimator.residual(free)
-    slopes, w = jacobian(residual, z, errors, free.probes, free.bounds[1]), weights(errors)
-    normal = slopes.T @ (w[:, None] * slopes)
-    folds, fitted = np.unique(blocks.folds), []
-    for k in folds:
-        rows = blocks.folds == k
-        rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
-        pull = slopes[rows].T @ (w[rows] * errors[rows])
-        ridge = RIDGE * np.diag(np.maximum(np.diag(normal), 1e-9))
-        fitted.append(np.clip(z + np.linalg.solve(rest + ridge, pull), *free.bounds))
-    before = np.bincount(blocks.folds, costs(library.model.errors))
+    folds = np.unique(blocks.folds)
     if len(folds) < 2:
         return np.array([law.gain])
-    after: Array = np.array(
-        [
-            float(np.sum(costs(e[blocks.folds == k])))
-            for k, e in zip(folds, residual(np.array(fitted)), strict=True)
-        ]
-    )
-    out: Array = before[folds] - after
+    slopes = jacobian(residual, z, errors, free.probes, free.bounds[1])
+    after = left_out_costs(law.minimum, slopes, free.bounds, residual, blocks.folds)
+    out: Array = (np.bincount(blocks.folds, costs(library.model.errors)) - after)[folds]
     return out
 
 

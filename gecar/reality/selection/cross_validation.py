@@ -9,15 +9,13 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.optimisation.least_squares import costs, weights
+from gecar.reality.optimisation.least_squares import Minimum, costs, left_out_costs
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.thresholds import NEGLIGIBLE, ONE_FOLD
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
-
-RIDGE = 1e-6
 
 
 def judged(problem: Problem, step: Step) -> Step:
@@ -57,24 +55,15 @@ def _predicted_gains(estimator: Estimator, base: Model, new: Model) -> Array:
 
 def _left_out_costs(estimator: Estimator, model: Model) -> Array:
     """Return each fold's cost under parameters fitted without it (one Newton step back), shape (folds,)."""
-    slopes, errors, z = estimator.own_sensitivities(model), model.errors, model.z
-    if not len(z):
-        return np.bincount(estimator.blocks.folds, costs(errors)).astype(float)
-    w, residual = weights(errors), estimator.residual(model.parameters)
-    out = np.zeros(int(estimator.blocks.folds.max()) + 1)
-    folds, fitted = np.unique(estimator.blocks.folds), []
-    normal = slopes.T @ (w[:, None] * slopes)
-    for k in folds:
-        rows = estimator.blocks.folds == k
-        rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
-        pull = slopes[rows].T @ (w[rows] * errors[rows])
-        # A parameter that this recording alone determines is not known without it: it stays neutral.
-        known = np.flatnonzero(np.diag(rest) > NEGLIGIBLE * np.diag(normal))
-        without = np.zeros(len(z))
-        block = rest[np.ix_(known, known)]
-        ridge = RIDGE * np.diag(np.maximum(np.diag(block), 1e-9))
-        without[known] = z[known] + np.linalg.solve(block + ridge, pull[known])
-        fitted.append(np.clip(without, *model.parameters.bounds))
-    for k, found in zip(folds, residual(np.array(fitted)), strict=True):
-        out[k] = float(np.sum(costs(found[estimator.blocks.folds == k])))
-    return out
+    if not len(model.z):
+        return np.bincount(estimator.blocks.folds, costs(model.errors)).astype(float)
+    minimum = Minimum(model.z, model.errors, model.cost)
+    # A parameter that one recording alone determines is not known without it: it stays neutral.
+    return left_out_costs(
+        minimum,
+        estimator.own_sensitivities(model),
+        model.parameters.bounds,
+        estimator.residual(model.parameters),
+        estimator.blocks.folds,
+        NEGLIGIBLE,
+    )
