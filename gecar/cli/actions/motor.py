@@ -1,11 +1,12 @@
-"""A motor's speeds for ``gecar motor``: simulated, recorded, drawn and told."""
+"""A motor's speeds for ``gecar motor``: simulated, recorded, as a picture and a table."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from rich.table import Table
 
 from gecar.cli.output import Output
 from gecar.errors import expected
@@ -13,20 +14,21 @@ from gecar.plots.reality.motor import Curve, motor_speed
 from gecar.plots.style import picture_kind, save
 from gecar.reality.recordings.bench_speed import steady_speeds
 from gecar.reality.recordings.recording import read_recording
-from gecar.report.motor import Speeds, motor_table
 from gecar.world.motor_bench import altered, settled_speeds
 from gecar.world.robot import Robot, load_robot
 
 LEVELS_PCT = tuple(range(0, 101, 5))
+Speeds = Mapping[float, float]
+"""Speed [deg/s] by level [%]."""
 
 
 def draw_motor(output: Output, benches: Sequence[Path], robot_name: str, out: Path) -> None:
-    """Simulate a robot's motor, set recordings beside it, draw both, and print a table.
+    """Simulate a robot's motor, compare it with recordings in a picture, and print a table.
 
     Parameters
     ----------
     output
-        Where words go.
+        Where text is printed.
     benches
         Folders of recordings, one for each motor.
     robot_name
@@ -55,7 +57,7 @@ def draw_motor(output: Output, benches: Sequence[Path], robot_name: str, out: Pa
         f"The motor's limit: {cap:g} % of the supply, {max(powered.values()):.0f} deg/s",
         detail,
     )
-    output.print(motor_table(regulated, powered, recorded))
+    output.print(_table(regulated, powered, recorded))
     out.parent.mkdir(parents=True, exist_ok=True)
     output.print(f"\nPicture: {save(figure, out)}")
     output.print_json(
@@ -103,3 +105,16 @@ def _curve(speeds: Speeds) -> Curve:
 
 def _name(folder: Path) -> str:
     return folder.resolve().name.replace("_", " ")
+
+
+def _table(regulated: Speeds, powered: Speeds, bench: Mapping[str, Speeds]) -> Table:
+    """Return a row for each level: the simulated motor's speeds, and those of real ones under duty commands."""
+    table = Table("level [%]", "speed command [deg/s]", "duty command [deg/s]", box=None, pad_edge=False)
+    for name in bench:
+        table.add_column(f"{name} [deg/s]")
+    for column in table.columns:
+        column.justify = "right"
+    for level in sorted(set().union(powered, *bench.values())):
+        speeds = [each.get(level) for each in (regulated, powered, *bench.values())]
+        table.add_row(f"{level:g}", *("" if speed is None else f"{speed:.0f}" for speed in speeds))
+    return table
