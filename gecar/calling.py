@@ -1,4 +1,4 @@
-"""How gecar is called here, for words that tell what to type next."""
+"""The command that starts gecar here, for messages with commands to type."""
 
 from __future__ import annotations
 

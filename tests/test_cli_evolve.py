@@ -225,4 +225,4 @@ def test_progress_says_all_that_matters():
     history = [Generation(0, 1e4, 1e4, 0.97, 0.9, 200, 0.5, 0.0, float("nan"), 150, 9),
                Generation(1, 16.744, 5210.0, 1.0, 0.31, 400, 1.0, 0.4, 20.0, 250, 19)]  # fmt: skip
     assert line(history, 51) == "1/51  best 16.74 s  mean 5210  valid 100 %  distinct 31 %  400/s  0:25 left"
-    assert "nobody at GOAL" in line(history[:1], 51)
+    assert "no program at GOAL" in line(history[:1], 51)

@@ -92,7 +92,7 @@ def test_a_killed_worker_is_replaced_and_its_batches_run_again(
     with Batches(Mortal(tmp_path / "mark"), PROCESSES, 2) as batches:
         assert evolved(batches) == evolved(Toy())
     words = capsys.readouterr().err
-    assert words.startswith("a worker died; started new ones, and ")
+    assert words.startswith("a worker died; new ones were started, and ")
     assert words.count("\n") == 1
 
 

@@ -212,7 +212,7 @@ def test_a_robot_file_keeps_terms(tmp_path):
 GOOD = {"port": "motor_torque", "law": "-a * speed", "a": 1.0}
 BAD = [
     ({"port": "engine"}, "found port 'engine', expected one of command"),
-    ({"law": "-a * sped"}, "found 'sped', expected a constant given beside the law (a) or a variable of motor_torque"),
+    ({"law": "-a * sped"}, "found 'sped', expected a constant given with the law (a) or a variable of motor_torque"),
     ({"law": "distance * a"}, "found 'distance'"),
     ({"law": "-a * * speed"}, "expected a formula"),
     ({"law": "__import__('os').system('true')"}, "expected numbers, variables"),

@@ -13,7 +13,7 @@ from gecar.files import json_text
 
 JsonOption = Annotated[
     bool,
-    typer.Option("--json", help="Print one JSON object on stdout; words go to stderr.", show_default=False),
+    typer.Option("--json", help="Print one JSON object on stdout; text goes to stderr.", show_default=False),
 ]
 
 

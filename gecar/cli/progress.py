@@ -73,7 +73,7 @@ def line(history: Sequence[Generation], generations: int) -> str:
     """
     last, speed = history[-1], pace(history, generations)
     best_s = min(generation.best for generation in history)
-    best = f"best {best_s:.2f} s" if best_s < UNSOLVED else "nobody at GOAL"
+    best = f"best {best_s:.2f} s" if best_s < UNSOLVED else "no program at GOAL"
     left = round(speed.left_s)
     return (
         f"{last.generation}/{generations}  {best}  mean {last.mean:.0f}  valid {100 * last.valid:.0f} %  "

@@ -138,9 +138,9 @@ def _say_death(deaths: int) -> None:
     if deaths > MAX_DEATHS:
         raise InputError(
             f"workers: found that they died {deaths} times in a row (killed, or out of memory), "
-            "expected them to live; fewer workers need less memory"
+            "expected them to keep running; fewer workers need less memory"
         )
-    print("a worker died; started new ones, and what they had begins again", file=sys.stderr, flush=True)
+    print("a worker died; new ones were started, and their work is repeated", file=sys.stderr, flush=True)
 
 
 def _stop_workers() -> None:

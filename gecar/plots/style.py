@@ -1,4 +1,4 @@
-"""One look for every picture: fonts, colours that all people can tell apart, and how pictures are saved."""
+"""Style of all pictures: fonts, colours for any colour vision, and saving."""
 
 from __future__ import annotations
 

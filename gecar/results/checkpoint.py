@@ -90,7 +90,9 @@ def _read(body: bytes, configuration: str, where: Path) -> State:
     header = json.loads(line)
     if header["configuration"] != configuration:
         raise expected(
-            where, "a checkpoint from another configuration", "one that belongs to the config.toml beside it"
+            where,
+            "a checkpoint from another configuration",
+            "one that belongs to the config.toml in the same folder",
         )
     arrays, used = {}, 0
     for name, kind in _layout(*header["sizes"]).items():

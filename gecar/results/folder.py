@@ -39,7 +39,7 @@ def check_new(path: Path) -> None:
         If it is.
     """
     if path.exists() or path.is_symlink():
-        raise expected("--out", f"{path}, which exists", "a new folder, or --resume to go on in it")
+        raise expected("--out", f"{path}, which exists", "a new folder, or --resume to continue in it")
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class RunFolder:
         return unpack(raw, configuration, place)
 
     def write_reports(self, evolution: Evolution[Program], durable: bool = True) -> None:
-        """Write history.csv and best.txt, if there is a generation to tell of."""
+        """Write history.csv and best.txt, if there is a generation."""
         if evolution.history:
             self.write("history.csv", history_csv(evolution.history), durable)
             program = evolution.best.program

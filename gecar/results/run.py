@@ -241,7 +241,7 @@ def measured(task: Task, evolution: Evolution[Program]) -> dict[str, Any]:
 
 
 def verified_on_pymunk(task: Task, evolution: Evolution[Program]) -> bool:
-    """Drive the best program once more with pymunk moving the body; tell whether it ends the same within a step."""
+    """Drive the best program once more with pymunk; return whether it ends the same within a step."""
     best = evolution.best
     if best.program is None:
         return False

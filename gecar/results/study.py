@@ -191,7 +191,9 @@ class StudyFolder:
             If it exists and ``again`` is not asked for, or cannot be made.
         """
         if not again and (self.path.exists() or self.path.is_symlink()):
-            raise expected("--out", f"{self.path}, which exists", "a new folder, or --resume to go on in it")
+            raise expected(
+                "--out", f"{self.path}, which exists", "a new folder, or --resume to continue in it"
+            )
         try:
             self.runs.mkdir(parents=True, exist_ok=True)
             for left in [*self.path.glob(".*.json.*"), *self.runs.glob(".*.json.*")]:

@@ -153,11 +153,11 @@ class Batches:
         if deaths > MAX_DEATHS:
             raise InputError(
                 f"workers: found that they died {deaths} times in a row (killed, or out of memory), "
-                "expected them to live; fewer workers need less memory"
+                "expected them to keep running; fewer workers need less memory"
             )
         batches = "batch" if lost == 1 else "batches"
         print(
-            f"a worker died; started new ones, and {lost} lost {batches} run again",
+            f"a worker died; new ones were started, and {lost} lost {batches} run again",
             file=sys.stderr,
             flush=True,
         )

@@ -167,7 +167,7 @@ def _no_law(node: ast.AST, constants: Sequence[str], port: Port) -> ValueError:
     if isinstance(node, ast.Name):
         given = ", ".join(constants) or "none"
         return ValueError(
-            f"found '{node.id}', expected a constant given beside the law ({given}) "
+            f"found '{node.id}', expected a constant given with the law ({given}) "
             f"or a variable of {port.id}: {', '.join(port.variables)}"
         )
     found = ast.unparse(node) if isinstance(node, ast.expr) else type(node).__name__

@@ -89,10 +89,14 @@ def bench_speeds(folder: Path) -> Speeds:
     """
     if not folder.is_dir():
         found = "no such folder" if not folder.exists() else "a file"
-        raise expected(folder, found, 'a folder with a motor\'s recordings (.csv, with rig = "bench" beside)')
+        raise expected(
+            folder, found, 'a folder with a motor\'s recordings (.csv, with rig = "bench" in their .toml)'
+        )
     steady = steady_speeds([read_recording(path) for path in sorted(folder.glob("*.csv"))])
     if not steady:
-        raise expected(folder, "no recording of one duty held", 'recordings (.csv) with rig = "bench" beside')
+        raise expected(
+            folder, "no recording of one duty held", 'recordings (.csv) with rig = "bench" in their .toml'
+        )
     by_level: dict[float, list[float]] = {}
     for each in steady:
         by_level.setdefault(abs(round(each.duty_pct, 3)), []).append(abs(each.speed_deg_s))

@@ -66,7 +66,7 @@ class Asked:
             If a file or an option is wrong.
         """
         if self.resume and self.out is None:
-            raise expected("--resume", "no --out", "--out with the folder to go on in")
+            raise expected("--resume", "no --out", "--out with the folder to continue in")
         before = read_study(self.out) if self.resume and self.out else Study({}, {})
         base = read_config(self.config) if self.config else before.base
         search = {**before.changes.get("search", {}), **self.changes["search"]}

@@ -14,7 +14,7 @@ def check(
     table: Annotated[
         Path | None,
         typer.Argument(metavar="TABLE.toml", help="Fitness table; --update fills in rows without figures.",
-                       show_default="benchmarks/fitness_table.toml, here or beside gecar"),
+                       show_default="benchmarks/fitness_table.toml, here or in gecar's repository"),
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write the new figures to the table.")] = False,
     pins: Annotated[

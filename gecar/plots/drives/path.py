@@ -28,7 +28,7 @@ def speed_of(trace: Trace) -> Series:
 
 
 def line_colours(trace: Trace) -> dict[int, str]:
-    """Give each line of the program that drove a colour: seven all can tell apart, beyond that a gradient."""
+    """Give each line of the program a colour: up to seven distinct colours, beyond that a gradient."""
     lines = [int(line) for line in np.unique(trace["line"]) if line > 0]
     if len(lines) <= len(CYCLE):
         return dict(zip(lines, CYCLE, strict=False))

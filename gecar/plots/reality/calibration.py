@@ -74,7 +74,7 @@ def _constants(axes: Axes, result: Calibration) -> None:
     reach = 1.3 * max([abs(_steps(f, v)) for f in result.fitted for v in (f.low, f.high)], default=1.0)
     axes.set_xlim(-max(reach, 2.0), max(reach, 2.0))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:+g}" if value else "0"))
-    axes.set_xlabel("change from nominal [smallest change worth a name]")
+    axes.set_xlabel("change from nominal [smallest change worth naming]")
     _rows(axes, names, [INK] * count + [SOFT] * len(_doubtful(result)))
 
 

@@ -39,7 +39,7 @@ def laws_figure(verdict: Verdict) -> Figure:
                 _draw_value(axes, law)
             else:
                 _draw_curve(axes, law, name)
-        drawn = "95 % band; grey: no recording went there" if any(telling) else "95 % interval"
+        drawn = "95 % band; grey: outside the recordings" if any(telling) else "95 % interval"
         headline(figure, "The law that was written", drawn)
     return figure
 

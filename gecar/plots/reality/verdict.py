@@ -203,7 +203,7 @@ def tried_figure(verdict: Verdict, told: Told | None = None) -> Figure:
             axes.grid(visible=False, axis="y")
         if not made:
             figure.add_subplot().set_axis_off()
-        others = "; what takes nothing away is left out"
+        others = "; those without an effect are not shown"
         detail = (
             f"on held-out recordings, each fitted in turn; blue: chosen{others}"
             if made
@@ -282,9 +282,7 @@ def map_figure(verdict: Verdict) -> Figure:
                 x, y, radius = place.place
                 axes.add_patch(_circle(x, y, radius))
         axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-        headline(
-            figure, "Where on the floor mismatch arises", "bright: much; circle: a place that stands out"
-        )
+        headline(figure, "Where on the floor mismatch arises", "bright: large; circle: a significant place")
     return figure
 
 

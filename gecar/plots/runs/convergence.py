@@ -211,7 +211,7 @@ def _draw_mean(axes: Axes, generation: Series, mean: Series) -> None:
     )
     axes.axhline(UNSOLVED, color=SOFT, linewidth=0.8, linestyle=":")
     axes.annotate(  # above the panel: below the dotted line the mean runs through it
-        "nobody at GOAL: $10^4$", (1.0, 1.0), (-2, 2), xycoords="axes fraction",
+        "no program at GOAL: $10^4$", (1.0, 1.0), (-2, 2), xycoords="axes fraction",
         textcoords="offset points", ha="right", va="bottom", size=7, color=SOFT,
     )  # fmt: skip
 

@@ -106,7 +106,7 @@ def _block(path: Path, lines: list[str], first: int, names: list[str]) -> Series
         if line.count(",") != commas:
             found = f"{line.count(',') + 1} fields" if line.strip() else "an empty line"
             raise expected(
-                f"{path}, line {first + k}", found, f"{commas + 1} (`gecar import` mends a cut file)"
+                f"{path}, line {first + k}", found, f"{commas + 1} (`gecar import` repairs a truncated file)"
             )
     fields = [text.strip() or "nan" for text in ",".join(lines).split(",")]
     try:

@@ -58,7 +58,7 @@ def _arrived(fields: dict[str, Any]) -> Setup:
 
 
 def read_setup(path: Path, factors: Mapping[str, tuple[str, float]]) -> Setup:
-    """Read the TOML beside a recording.
+    """Read the TOML file of a recording.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def read_setup(path: Path, factors: Mapping[str, tuple[str, float]]) -> Setup:
     """
     if not path.exists():
         return Setup()
-    found = read_toml(path, "the TOML beside a recording")
+    found = read_toml(path, "the TOML file of a recording")
     _refuse_unknown(path, found)
     return Setup(
         robot=_name_or_path(path, "robot", _text(path, found, "robot", "ev3")),

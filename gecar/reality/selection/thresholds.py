@@ -60,13 +60,13 @@ CLOCKS_SCATTER_S = Threshold(
 WHOLE_SHARE = Threshold(0.85, "share of all excess energy that effects together must explain", _EXAMINED)
 MAIN_SHARE = Threshold(
     0.35,
-    "share of what is left without it, squared, that an effect beside the unexplained must explain",
+    "share of the squared error that an effect must explain where other error remains unexplained",
     _EXAMINED,
 )
 STEADY = Threshold(
     0.08,
-    "relative spread over recordings of an effect's size, beside what nothing explains",
-    "10 cases of the 3D engine: causes beside other physics 0.00 to 0.06, imitations of that physics 0.10 to 0.27",
+    "relative spread over recordings of an effect's size, where other error remains unexplained",
+    "10 cases of the 3D engine with other physics: causes 0.00 to 0.06, imitations of that physics 0.10 to 0.27",
 )
 LEFT_SHARE = Threshold(
     0.15,
@@ -83,15 +83,15 @@ MEASURED = Threshold(
 # -- What a simulation is off by
 SMALL = Threshold(
     0.3,
-    "sizes worth a name: standard deviation of what a robot's constants are off by",
-    "with `PRICE` a name begins at 1.3 sizes; 0.5 missed half of what is worth a name, in cases with a background",
+    "sizes worth naming: standard deviation of the errors of a robot's constants",
+    "with `PRICE`, effects are named from 1.3 sizes; 0.5 missed half of those worth naming, in cases with a background",
 )
 LARGE = Threshold(3.0, "the same, of changes whose remainder is physics in no list", "ten times `SMALL`")
 
 # -- What a name costs
 PRICE = Threshold(
     10.0,
-    "log-likelihood an effect must gain beside small changes of all constants",
+    "log-likelihood an effect must gain in addition to small changes of all constants",
     "prior odds of 1 in 30 effects (3.4), and of a size between one and a hundred names (4.6), rounded up",
 )
 
@@ -103,7 +103,7 @@ CERTAIN = Threshold(2.5, "standard deviations of that loss beyond which it is ce
 
 # -- Size
 STOPPED = Threshold(8.0, "coordinates from neutral at which a fit that ends at a bound has not ended", "hand")
-LEAST_INVERSE = Threshold(0.02, "coordinate of a limit or rate worth a name", "hand")
+LEAST_INVERSE = Threshold(0.02, "coordinate of a limit or rate worth naming", "hand")
 
 # -- What passes for the sensors' noise
 WHITE_MOTION = Threshold(

@@ -13,7 +13,7 @@ from gecar.world.course.schema import TILE_SIZE_M
 _TEMPLATE = '''\
 # A course for gecar. Look at it with `gecar course show {file}`.
 title = "{title}"
-notes = "A loop to begin with."
+notes = "A loop, as a template."
 
 tile_size_m = {tile:g}
 line_width_m = {line:g}

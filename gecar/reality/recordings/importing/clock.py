@@ -123,7 +123,7 @@ def _coarse_offset(brick: Track, camera: Track) -> tuple[float, float, float]:
     scores[1:] = [np.abs(turn) for turn in scores[1:]]  # headings may count clockwise
     score = np.mean(scores, axis=0)
     if not np.isfinite(score).any():
-        raise InputError("the encoders or the camera saw no motion, so that their clocks can not be aligned")
+        raise InputError("the encoders or the camera show no motion, so that their clocks cannot be aligned")
     score = np.nan_to_num(score, nan=-1.0)
     lags = (np.arange(len(score)) - (len(at_c) - 1)) * _GRID_S
     best = int(score.argmax())

@@ -65,7 +65,7 @@ def _loaded(path: Path) -> dict[str, Any]:
         command = [sys.executable, "-c", _TRY, str(path)]
         tried = subprocess.run(command, capture_output=True, timeout=_LONGEST_TRY_S, check=False)  # noqa: S603
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
-        raise expected(path, f"a file that can not be read ({error})", "a .mat file") from None
+        raise expected(path, f"a file that cannot be read ({error})", "a .mat file") from None
     if tried.returncode != 0:
         raise expected(path, "no MATLAB file, or a damaged one", "a .mat file of version 7 or earlier")
     found: dict[str, Any] = loadmat(path, simplify_cells=True)
