@@ -93,6 +93,19 @@ def test_a_fold_is_judged_at_coordinates_fitted_to_the_others(least: float) -> N
     assert np.isfinite(found).all()
 
 
+def test_a_newton_step_that_leaves_the_range_of_its_derivatives_is_cut() -> None:
+    """Without the first fold the second one's slope, nearly 0, asks for a step of -150."""
+
+    def residual(z: np.ndarray) -> np.ndarray:
+        off = z[:, 0] - 1.0
+        return np.stack([20.0 * off, 20.0 * off + 0.1, 1.5 + 0.01 * off + 5.0 * off**2], axis=1)
+
+    minimum = Minimum(np.ones(1), residual(np.ones((1, 1)))[0], 0.0)
+    slopes, folds = np.array([[20.0], [20.0], [0.01]]), np.array([0, 0, 1])
+    without, _ = left_out_costs(minimum, slopes, (np.full(1, -1e3), np.full(1, 1e3)), residual, folds)
+    assert without == pytest.approx(cost(minimum.errors[:2]), abs=1.0)
+
+
 def test_the_null_distribution_is_the_largest_of_several_chi_squares() -> None:
     problem = linear_problem(linear({}, RESPONSES))
     gains = 2.0 * largest_gains(problem.estimator, problem.catalogue, problem.known)

@@ -18,6 +18,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 KNEE = 4.0  # standard deviations beyond which a residual counts linearly
 RIDGE = 1e-6  # of the diagonal, where some coordinates do the same
+HALVINGS = 5  # of a step that goes too far
 TOGETHER = 32  # vectors of residuals, a megabyte or less each
 
 
@@ -162,6 +163,9 @@ def left_out_costs(
 ) -> Array:
     """Return the robust cost of each fold at coordinates fitted without it, one Newton step from the minimum.
 
+    A step after which the other folds cost more has left the range of its derivatives: it is halved until they do not
+    (Dennis and Schnabel, Numerical Methods for Unconstrained Optimization, 1996, ch. 6.3).
+
     Parameters
     ----------
     minimum
@@ -183,17 +187,42 @@ def left_out_costs(
         Shape (largest fold + 1,); 0 for folds without residuals.
     """
     w, names = weights(minimum.errors), np.unique(folds)
-    normal, fitted = slopes.T @ (w[:, None] * slopes), []
+    normal, starts, steps = slopes.T @ (w[:, None] * slopes), [], []
     for k in names:
         rows = folds == k
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * minimum.errors[rows])
         known = np.flatnonzero(np.diag(rest) > least * np.diag(normal))
         ridge = RIDGE * np.diag(np.maximum(np.diag(normal)[known], 1e-9))
-        without = np.zeros(len(minimum.z))
-        without[known] = minimum.z[known] + np.linalg.solve(rest[np.ix_(known, known)] + ridge, pull[known])
-        fitted.append(np.clip(without, *bounds))
+        start, step = np.zeros((2, len(minimum.z)))
+        start[known] = minimum.z[known]
+        step[known] = np.linalg.solve(rest[np.ix_(known, known)] + ridge, pull[known])
+        starts.append(start)
+        steps.append(step)
+    found = _halved(np.array(starts), np.array(steps), minimum, bounds, residual, folds)
     out = np.zeros(int(names.max()) + 1)
-    for k, errors in zip(names, residual(np.array(fitted)), strict=True):
+    for k, errors in zip(names, found, strict=True):
         out[k] = cost(errors[folds == k])
     return out
+
+
+def _halved(
+    starts: Array,
+    steps: Array,
+    minimum: Minimum,
+    bounds: tuple[Array, Array],
+    residual: Residual,
+    folds: npt.NDArray[np.integer[Any]],
+) -> Array:
+    """Return the residuals after each fold's step, halved while the other folds cost more than at the minimum."""
+    names, share = np.unique(folds), np.ones(len(starts))
+    before = np.array([cost(minimum.errors[folds != k]) for k in names])
+    whole = (starts == minimum.z).all(axis=1)  # elsewhere a coordinate became 0, which may cost something
+    for factor in (*[0.5] * HALVINGS, 0.0, 0.0):
+        errors = residual(np.clip(starts + share[:, None] * steps, *bounds))
+        after = np.array([cost(e[folds != k]) for k, e in zip(names, errors, strict=True)])
+        worse = whole & (after > before + 1.0)
+        if not worse.any():
+            break
+        share[worse] *= factor
+    return errors
