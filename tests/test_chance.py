@@ -13,6 +13,7 @@ from gecar.language.grammar import load_grammar
 from gecar.language.mapping import Mapper
 from gecar.language.program import parse_program
 from gecar.results.arrival import arrives
+from gecar.search import chance
 from gecar.search.batches import Batches
 from gecar.search.chance import (
     CHOICE_STEPS_S,
@@ -33,7 +34,7 @@ from gecar.search.programs import RobotPrograms
 from gecar.search.settings import Settings
 from gecar.world.course.course import load_course
 from gecar.world.kernel.conditions import conditions
-from gecar.world.perturbation import drawn_conditions
+from gecar.world.perturbation import drawn_conditions, drawn_steps_s
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Driver, Fleet, Outcome, World, simulate
 
@@ -46,6 +47,7 @@ LEAVES = parse_program("motor(80,80,100)").opcodes
 def score_of(fitness, drawn, n=8):
     score = np.zeros(1, score_type(0, n))[0]
     score["fitness_s"], score["share"] = fitness, 0.5
+    score["fastest_s"] = score["slowest_s"] = fitness
     score["drawn_s"] = [*drawn, *[np.nan] * (n - len(drawn))]
     return score
 
@@ -56,6 +58,37 @@ def test_the_merit_is_the_median_time_of_what_arrives_often_enough():
     assert score["merit"] == 16.0
     pool(score, 0.9)
     assert score["merit"] == UNSOLVED
+
+
+def test_a_program_whose_time_depends_on_the_step_has_to_be_faster_to_count_as_much():
+    steady, unsteady, lost = (score_of(16.0, [16.0, 16.0]) for _ in range(3))
+    steady["slowest_s"], unsteady["slowest_s"], lost["slowest_s"] = 16.2, 16.8, np.inf
+    for score in (steady, unsteady, lost):
+        pool(score, 0.75)
+    assert steady["merit"] == 16.2
+    assert unsteady["merit"] == pytest.approx(16.8 * (1.0 + chance.PRICE * (16.8 / 16.0 - chance.STEADY)))
+    assert lost["merit"] == UNSOLVED
+
+
+def test_the_fastest_and_slowest_of_all_generations_steps_are_kept():
+    score, more = score_of(16.0, [16.0, 16.0], n=4), score_of(16.0, [16.0, 16.0], n=4)
+    more["fastest_s"], more["slowest_s"] = 15.9, 16.1
+    add_drives(score, more, 0.75)
+    assert (score["fastest_s"], score["slowest_s"]) == (15.9, 16.1)
+
+
+def test_what_comes_through_the_race_is_driven_at_other_steps_and_nothing_else_is():
+    fragile, steady = DriveEvaluator(WORLD, draws=16)([FRAGILE, STEADY], [1, 2])
+    assert fragile["fastest_s"] == fragile["slowest_s"] == fragile["fitness_s"]
+    times = drives_at_steps(WORLD, [STEADY], drawn_steps_s((0, 0)))[0]
+    assert steady["slowest_s"] == max(steady["fitness_s"], *times)
+    assert steady["fastest_s"] == min(steady["fitness_s"], *times)
+
+
+def test_steps_are_drawn_afresh_every_generation_from_every_quarter_of_their_range():
+    first, again, later = (drawn_steps_s((3, generation)) for generation in (0, 0, 1))
+    assert first == again != later
+    assert np.digitize(first, 0.0007 * 6.0 ** np.array([0.0, 0.25, 0.5, 0.75, 1.0])).tolist() == [1, 2, 3, 4]
 
 
 def test_credit_grows_with_arrivals_and_never_reaches_a_program_that_arrives_often_enough():

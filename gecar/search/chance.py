@@ -4,9 +4,9 @@ Eq. 1 is the time of one drive, in a simulation whose step, start and robot are 
 programs that owe their time to those digits and leave the course elsewhere: the reality gap of Jakobi (1997), and what
 Koos, Mouret and Doncieux (IEEE T-EC 17(1), 2013) call transferability. Here a program is driven under conditions drawn
 anew in every generation (`gecar.world.perturbation`). What counts is a chance-constrained quantile of eq. 1: the median
-time to GOAL, or the nominal drive's where that is longer, if the required share of all its drives so far arrives, and
-10^4 if not. Programs met again in later
-generations are driven again, so that luck does not last.
+time to GOAL if the required share of all its drives so far arrives, and 10^4 if not. The nominal robot is driven at
+other steps, too: its longest time counts where that exceeds the median, and more where times differ between steps.
+Programs met again in later generations are driven again, so that luck does not last.
 """
 
 from __future__ import annotations
@@ -31,13 +31,28 @@ MARGIN = 1.05
 """How far behind the best so far, in time to GOAL, a program is let go after the first draws."""
 STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 """Steps a result is checked at [s]."""
-CHOICE_STEPS_S = (0.0036, 0.003, 0.0024, 0.0016, 0.0014, 0.0012, 0.0008, 0.0007, 0.0006, 0.0004, 0.0003)
+CHOICE_STEPS_S = (
+    0.0042,
+    0.0036,
+    0.003,
+    0.0024,
+    0.0016,
+    0.0014,
+    0.0012,
+    0.0008,
+    0.0007,
+    0.0006,
+    0.0004,
+    0.0003,
+)
 """Steps the programs that a result is chosen from are driven at [s]."""
 AS_GOOD = 1.01
 """How much slower a shorter program may be to be chosen before the best: lexicographic parsimony in buckets (Luke and
 Panait, GECCO 2002)."""
-STEADY = 1.02
-"""How much longer the slowest of these drives may take than the fastest."""
+STEADY = 1.015
+"""How much longer the slowest of the nominal robot's drives at other steps may take than the fastest."""
+PRICE = 5.0
+"""By how many per cent merit is worse for each per cent beyond that."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -64,9 +79,16 @@ def pool(score: np.void, share: float) -> None:
     drawn = score["drawn_s"]
     times = np.concatenate([[score["fitness_s"]], drawn[~np.isnan(drawn)]])
     arrived = np.isfinite(times)
-    enough = arrived.mean() >= share
-    score["merit"] = max(np.median(times[arrived]), score["fitness_s"]) if enough else UNSOLVED
+    enough = arrived.mean() >= share and score["slowest_s"] < np.inf
+    score["merit"] = (
+        max(np.median(times[arrived]), score["slowest_s"]) * _unsteady(score) if enough else UNSOLVED
+    )
     score["share"] = 1.0 if enough else 0.5 + 0.5 * arrived.sum() / max(len(drawn) / ROUNDS + 1, len(times))
+
+
+def _unsteady(score: np.void) -> float:
+    """Return the factor by which a program's merit is worse because its time depends on the simulation's step."""
+    return 1.0 + PRICE * max(score["slowest_s"] / score["fastest_s"] - STEADY, 0.0)
 
 
 def add_drives(score: np.void, more: np.void, share: float) -> None:
@@ -76,6 +98,8 @@ def add_drives(score: np.void, more: np.void, share: float) -> None:
     fresh = new[~np.isnan(new)][: len(free)]
     old[free[: len(fresh)]] = fresh
     score["steps"] = more["steps"]
+    score["slowest_s"] = max(score["slowest_s"], more["slowest_s"])
+    score["fastest_s"] = min(score["fastest_s"], more["fastest_s"])
     pool(score, share)
 
 

@@ -16,8 +16,8 @@ from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.parallel.pickled import Pickled, unpickled
 from gecar.search.chance import FIRST_DRAWS, MARGIN, n_times, pool
 from gecar.search.fitness import score_type
-from gecar.world.kernel.conditions import Conditions
-from gecar.world.perturbation import drawn_conditions
+from gecar.world.kernel.conditions import Conditions, joined
+from gecar.world.perturbation import drawn_conditions, drawn_steps_s
 from gecar.world.rollout import Fleet, Outcome, World
 
 Opcodes = npt.NDArray[np.int32]
@@ -84,6 +84,7 @@ class DriveEvaluator:
         scores["fitness_s"] = scores["merit"] = np.where(solved, summary["time_s"], UNSOLVED)
         scores["share"] = self._shares(arrival)
         scores["arrival_s"] = arrival[:, : self.n_arrivals]
+        scores["slowest_s"] = scores["fastest_s"] = scores["fitness_s"]
         scores["drawn_s"] = np.nan
         return scores
 
@@ -116,6 +117,27 @@ class DriveEvaluator:
             at_goal = summary["outcome"] == Outcome.GOAL
             scores["drawn_s"][k, row] = np.where(at_goal, summary["time_s"], np.inf)
             np.add.at(scores["steps"], k, summary["steps"])
+        missed = np.isinf(scores["drawn_s"]).sum(axis=1)
+        self._at_other_steps(scores, left[missed[left] <= allowed], programs, seeds, generation)
+
+    def _at_other_steps(
+        self,
+        scores: Scores,
+        left: npt.NDArray[np.intp],
+        programs: Sequence[Opcodes],
+        seeds: Sequence[int],
+        generation: int,
+    ) -> None:
+        """Drive the nominal robot at the generation's steps by what came through the race."""
+        steps = drawn_steps_s((self.seed, generation))
+        under = joined([replace(self.world, step_s=step).nominal for step in steps])
+        k, row = (axis.ravel() for axis in np.meshgrid(left, np.arange(len(under)), indexing="ij"))
+        streams = np.array(seeds, np.uint64)[k]
+        summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
+        times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+        np.maximum.at(scores["slowest_s"], k, times)
+        np.minimum.at(scores["fastest_s"], k, times)
+        np.add.at(scores["steps"], k, summary["steps"])
 
     def _shares(self, arrival: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """How far along the course drives came: tiles in order, and among equals who was there sooner, 0..1."""

@@ -21,8 +21,10 @@ def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
         ``fitness_s``: eq. 1 [s]. ``merit``: what selection goes by; eq. 1, or its quantile under drawn conditions
         (`gecar.search.chance`). ``share``: how far along the course it came, 0..1, for selection only.
         ``outcome``, ``checkpoints``, ``time_s``, ``steps``: of the nominal drive; steps of all. ``arrival_s``: when
-        each tile of the course's sequence was reached [s], nan where it was not. ``drawn_s``: times to GOAL under drawn
-        conditions [s], inf where it was missed, nan where nothing was driven.
+        each tile of the course's sequence was reached [s], nan where it was not. ``fastest_s``, ``slowest_s``: the
+        least and the most time to GOAL of the nominal robot at the steps it was driven at so far [s]; ``slowest_s`` is
+        inf where it missed GOAL at one. ``drawn_s``: times to GOAL under drawn conditions [s], inf where it was missed,
+        nan where nothing was driven.
     """
     return np.dtype(
         [
@@ -34,6 +36,8 @@ def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
             ("time_s", "<f8"),
             ("steps", "<i8"),
             ("arrival_s", "<f8", (n_arrivals,)),
+            ("fastest_s", "<f8"),
+            ("slowest_s", "<f8"),
             ("drawn_s", "<f4", (n_times,)),
         ]
     )

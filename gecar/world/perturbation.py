@@ -15,6 +15,7 @@ from gecar.world.kernel.conditions import Conditions, conditions, select
 from gecar.world.rollout import Drive, Driver, World
 
 MOST = 10_000
+_STEPS = 1_000_081
 
 Floats = npt.NDArray[np.float64]
 
@@ -71,6 +72,13 @@ def drawn_conditions(world: World, count: int, seed: int | tuple[int, ...] = 0) 
         world.noise.motor_share,
         np.where(u[11] < 0.25, 0.0, 0.2 + 0.8 * u[11]),
     )
+
+
+def drawn_steps_s(seed: int | tuple[int, ...] = 0) -> list[float]:
+    """Draw four steps for the nominal robot, 0.7 to 4.2 ms [s]: log-uniform, one in each quarter of that range."""
+    rng = np.random.default_rng((*np.atleast_1d(seed).tolist(), _STEPS))
+    quarter = (np.arange(4) + rng.uniform(size=4)) / 4.0
+    return [0.0007 * 6.0 ** float(share) for share in quarter]
 
 
 def under_drawn_conditions(
