@@ -218,6 +218,22 @@ def test_a_run_with_draws_goes_on_to_the_same_end():
     assert resumed.best.genome.tolist() == whole.best.genome.tolist()
 
 
+def test_a_program_that_was_lucky_once_does_not_end_the_race_for_the_others():
+    evolution = new_evolution(Settings(population=8, elites=1, generations=3, codons=60, draws=4))
+    lucky = None
+    for to_beat, drawn in ((math.inf, 10.0), (10.0, math.inf), (20.0, math.inf)):
+        asked = evolution.ask()
+        assert {candidate.to_beat for candidate in asked} == {to_beat}
+        lucky = lucky or asked[0].program
+        scores = np.array([score_of(20.0, [20.0] * 3, n=24) for _ in asked])
+        for score, candidate in zip(scores, asked, strict=True):
+            if candidate.program == lucky:
+                score["fitness_s"] = score["fastest_s"] = score["slowest_s"] = 10.0
+                score["drawn_s"][:3] = drawn
+            pool(score, 0.95)
+        evolution.tell(scores)
+
+
 def test_programs_that_differ_beyond_the_cap_are_one():
     texts = ("motor(80,-100,50)", "motor(100,-80,50)", "motor(70,-80,50)")
     capped = [RobotPrograms(duty_cap_pct=80).meaning(parse_program(text)) for text in texts]

@@ -245,7 +245,8 @@ class Evolution(Generic[P]):
             if phenotype is not None and self._wants_drives(phenotype.digest):
                 programs[phenotype.digest] = phenotype.program
                 self._asked.setdefault(phenotype.digest, []).append(i)
-        to_beat = math.inf if self._best is None else self._best.merit
+        # What is known of the best by now: one that was lucky must not end the race for all others.
+        to_beat = math.inf if self._best is None else self.contenders[0].merit
         generation, seed = len(self.history), self.seed
         return [
             Candidate(program, self.problem.seed(program, digest, seed), to_beat, generation)

@@ -12,6 +12,7 @@ Programs met again in later generations are driven again, so that luck does not 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.scores import UNSOLVED
+from gecar.parallel.executors import usable_cores
 from gecar.world.kernel.conditions import Conditions, joined
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.rollout import Fleet, Outcome, World
@@ -167,7 +169,15 @@ def times_to_goal(
     """
     shape = len(programs), len(under)
     pairs = np.stack(np.divmod(np.arange(len(programs) * len(under)), len(under)), axis=1)
-    summary, _ = Fleet(world).drive(programs, under, pairs, np.broadcast_to(streams, shape).ravel())
+    seeds = np.broadcast_to(streams, shape).ravel()
+
+    def driven(part: npt.NDArray[np.intp]) -> npt.NDArray[np.void]:
+        return Fleet(world).drive(programs, under, pairs[part], seeds[part])[0]
+
+    # Kernels let other threads run; pymunk, in Python, does not.
+    threads = 1 if world.uses_pymunk else usable_cores()
+    with ThreadPoolExecutor(threads) as pool:
+        summary = np.concatenate(list(pool.map(driven, np.array_split(np.arange(len(pairs)), threads))))
     times: Floats = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
     return times.reshape(shape)
 
