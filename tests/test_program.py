@@ -9,16 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gecar.errors import InputError
+from gecar.language.conditions import Comparison, Threshold
 from gecar.language.grammar import load_grammar, parse_grammar
 from gecar.language.program import Program, mirrored, parse_program, read_program
 from gecar.language.robot_language import check_robot_language
-from gecar.language.statements import Comparison, Condition, If, Motor, MotorUntil, Sensor, Statement
+from gecar.language.statements import If, Motor, MotorUntil, Statement
+from gecar.language.values import Sensor
 
 FIG_6 = """if(SensorValue > 80):
     motor(80,80,50)
 else:
     motor(80,0,160)"""
-WHITE = Condition(Sensor.CENTRE, Comparison.GREATER, 80_000)
+WHITE = Threshold(Sensor.CENTRE, Comparison.GREATER, 80_000)
 LINE_TRACER = Program((If(WHITE, (Motor(80, 80, 50),), (Motor(80, 0, 160),)),))
 
 
@@ -146,25 +148,32 @@ def test_the_same_rows_are_the_same_program_whatever_the_lines() -> None:
         ("motor(101,2,3)", "column 7: found '101', expected a duty of -100..100 percent"),
         ("motor(1,60 + 41,3)", "column 9: found '60 + 41', expected a duty"),
         ("motor(1,2,-1)", "column 11: found '-1', expected a time of 0..60000 ms"),
-        ("motor(SensorValue,2,1)", "found 'SensorValue', expected a duty"),
+        ("motor(1,2,SensorValue)", "found 'SensorValue', expected a time of 0..60000 ms"),
+        ("motor(1 + (SensorValue > 5),2,1)", "expected a value, since conditions are only asked"),
+        ("motor(100001*SensorValue,2,1)", "expected numbers within 100000 where the robot calculates"),
+        ("r0 = 1" + "+r0" * 101, "expected at most 100 operations in a statement"),
+        ("r8 = 1", "found 'r8', expected motor, motor_until, if, while"),
+        ("f()", "expected motor, motor_until, if, while, r0 = ..., reset_timer, def, a name it defined"),
+        ("def f() { f() }", "found 'f', expected motor, motor_until, if"),
+        ("def r0() {}", "found 'r0', expected a new name"),
+        ("def f() {} def f() {}", "column 16: found 'f', expected a new name"),
+        ("def a(){" + "pass;" * 99 + "}" + "a();" * 99, "expected a program of at most 10000 statements"),
         ("motor(1/0,2,1)", "column 9: found '0', expected a divisor other than 0"),
-        ("motor(1+SensorValue,2,1)", "expected a number, since sensors are only compared"),
         ("motor(99999999999999,2,1)", "expected numbers and divisors up to a million million"),
         ("motor(" + "9" * 50 + ",2,1)", "expected a number of at most 20 digits"),
         ("motor($,2,1)", "column 7: found '$', expected a number or SensorValue"),
         (
             "if 5 > 3 {}",
-            "found '5 > 3', expected a sensor on one side of the comparison and a number on the other",
+            "found '5 > 3', expected a sensor, timer or register on a side of the comparison",
         ),
         ("if SensorValue {}", "found 'SensorValue', expected a comparison, as SensorValue > 50"),
-        ("if SensorValue > LeftSensorValue {}", "expected a sensor on one side"),
         ("if SensorValue > 1001 {}", "expected a threshold within 1000 percent"),
         ("if SensorValue > 5 motor(1,2,3)", "column 20: found 'motor', expected : or {"),
         ("if SensorValue > 5 { motor(1,2,3)", "found the end, expected } to close the branch"),
-        ("if SensorValue > 5:", "found the end, expected motor, motor_until, if or pass after the colon"),
+        ("if SensorValue > 5:", "found the end, expected motor, motor_until, if, while"),
         (
             "if SensorValue > 5:\nmotor(1,2,3)",
-            "line 2, column 1: found 'motor', expected motor, motor_until, if or pas",
+            "line 2, column 1: found 'motor', expected motor, motor_until, if, while",
         ),
         (
             "if SensorValue > 5:\n    motor(1,2,3)\n  motor(1,2,3)",
@@ -204,7 +213,7 @@ def test_programs_are_read_from_files(tmp_path: Path) -> None:
 duties = st.integers(-100, 100)
 drives = st.tuples(duties, duties, st.integers(0, 60_000))
 conditions = st.builds(
-    Condition, st.sampled_from(Sensor), st.sampled_from(Comparison), st.integers(-1_000_000, 1_000_000)
+    Threshold, st.sampled_from(Sensor), st.sampled_from(Comparison), st.integers(-1_000_000, 1_000_000)
 )
 simple: st.SearchStrategy[Statement] = drives.map(lambda drive: Motor(*drive)) | st.builds(
     lambda drive, condition: MotorUntil(drive[0], drive[1], drive[2], condition), drives, conditions

@@ -8,15 +8,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gecar.brick import calibration_template, main_template
+from gecar.brick.memory_template import keeping_text, memory_text, registers_set
 from gecar.brick.python_source import READERS, function_text
 from gecar.errors import expected
 from gecar.language.program import Program
-from gecar.language.statements import If, Sensor, Statement
+from gecar.language.statements import If, Statement, While
+from gecar.language.values import Sensor
 from gecar.world.robot import Robot
 
 TARGETS = ("pybricks2", "pybricks4")
 TIME_LIMIT_S = 60  # the paper's
 MOST_STATEMENTS = 1000  # MicroPython's jumps reach 32 kB: an if of more statements would not compile
+MOST_ROWS = 3000  # for the same reason, those of calculation counted
 
 _CONSTANTS = {
     Sensor.CENTRE: "COLOUR_SENSOR",
@@ -90,6 +93,10 @@ def export_program(program: Program, robot: Robot, target: str, ports: Ports | N
     statements = sum(1 for _ in _all(program.statements))
     if not 1 <= statements <= MOST_STATEMENTS:
         raise expected("program", f"{statements} statements", f"1 to {MOST_STATEMENTS}, to fit on a brick")
+    if len(program.opcodes) > MOST_ROWS:
+        raise expected(
+            "program", f"{len(program.opcodes)} rows of opcodes", f"at most {MOST_ROWS}, to fit on a brick"
+        )
     files = {"main.py": _main(program, robot, target, ports or Ports())}
     return files | _vs_code() if target == "pybricks2" else files
 
@@ -100,6 +107,8 @@ def _all(statements: Sequence[Statement]) -> Iterator[Statement]:
         if isinstance(statement, If):
             yield from _all(statement.then)
             yield from _all(statement.otherwise)
+        elif isinstance(statement, While):
+            yield from _all(statement.body)
 
 
 def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
@@ -107,7 +116,7 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
     second = target == "pybricks2"
     text = (
         main_template.TOP
-        + function_text(program.statements)
+        + function_text(program.statements, registers_set(program))
         + main_template.DRIVING
         + (calibration_template.KEEP_IN_FILE if second else calibration_template.KEEP_IN_STORAGE)
         + main_template.RUN
@@ -116,6 +125,7 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
         _robot_words(robot, ports)
         | _sensor_words(sensors, ports)
         | _log_words(second, Sensor.CENTRE in sensors)
+        | {"MEMORY": memory_text(program), "KEEP_READINGS": keeping_text(program)}
     )
     for name, word in words.items():
         text = text.replace(f"[[{name}]]", word)

@@ -92,7 +92,7 @@ def motor_until(left, right, most_ms, test):
 def command(left, right):
     """Set both duties, and log from when."""
     global left_duty, right_duty
-    left_duty = left
+[[KEEP_READINGS]]    left_duty = left
     right_duty = right
     left_motor.[[COMMAND]]
     right_motor.[[COMMAND_RIGHT]]
@@ -129,7 +129,7 @@ def drive_until_due(test):
             return
 
 
-[[SENSOR_FUNCTIONS]]
+[[MEMORY]][[SENSOR_FUNCTIONS]]
 def reading(number):
     """Return a sensor's reflected light on the scale of WHITE_PCT and BLACK_PCT, in whole percent."""
     white, black = calibration[number]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -13,9 +12,12 @@ import numpy.typing as npt
 from gecar.errors import expected
 from gecar.files import read_text
 from gecar.language import opcodes
+from gecar.language.layout import Layout
+from gecar.language.mirror import mirror
 from gecar.language.source_position import plain
-from gecar.language.statements import Condition, If, Motor, MotorUntil, Sensor, Statement
+from gecar.language.statements import Statement
 from gecar.language.syntax import parse_statements
+from gecar.language.values import Sensor
 
 Opcodes = npt.NDArray[np.int32]
 
@@ -33,10 +35,8 @@ class Program:
     statements: tuple[Statement, ...]
 
     @cached_property
-    def _layout(self) -> _Layout:
-        layout = _Layout()
-        layout.block(self.statements, 0)
-        return layout
+    def _layout(self) -> Layout:
+        return Layout(self.statements)
 
     @cached_property
     def source(self) -> str:
@@ -56,59 +56,11 @@ class Program:
     @cached_property
     def sensors(self) -> frozenset[Sensor]:
         """The sensors the program reads."""
-        tests = self.opcodes[self.opcodes[:, opcodes.OP] == opcodes.TEST]
-        return frozenset(sensor for sensor in Sensor if sensor.index in tests[:, opcodes.A])
+        used = sensors_used(self.opcodes)
+        return frozenset(sensor for sensor in Sensor if used[sensor.index])
 
     def __str__(self) -> str:
         return self.source
-
-
-class _Layout:
-    """Writes lines and rows side by side, so that each row knows its line."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.rows: list[list[int]] = []
-
-    def block(self, statements: Iterable[Statement], depth: int) -> None:
-        for statement in statements:
-            self.lines.append("    " * depth + str(statement))
-            if isinstance(statement, If):
-                self.conditional(statement, depth)
-            else:
-                self.drive(statement)
-
-    def drive(self, statement: Motor | MotorUntil) -> None:
-        if isinstance(statement, Motor):
-            self.row(opcodes.MOTOR, statement.left, statement.right, statement.time)
-        else:
-            self.row(opcodes.MOTOR_UNTIL, statement.left, statement.right, statement.time)
-            self.test(statement.condition)
-
-    def conditional(self, statement: If, depth: int) -> None:
-        line = len(self.lines)
-        test = self.test(statement.condition)
-        if statement.then:
-            self.block(statement.then, depth + 1)
-        else:
-            self.lines.append("    " * (depth + 1) + "pass")
-        if statement.otherwise:
-            jump = self.row(opcodes.JUMP)
-            jump[opcodes.LINE] = line
-            test[opcodes.TARGET] = len(self.rows)
-            self.lines.append("    " * depth + "else:")
-            self.block(statement.otherwise, depth + 1)
-            jump[opcodes.TARGET] = len(self.rows)
-        else:
-            test[opcodes.TARGET] = len(self.rows)
-
-    def test(self, condition: Condition) -> list[int]:
-        return self.row(opcodes.TEST, condition.sensor.index, condition.comparison.index, condition.threshold)
-
-    def row(self, op: int, a: int = 0, b: int = 0, c: int = 0) -> list[int]:
-        row = [op, a, b, c, 0, len(self.lines)]
-        self.rows.append(row)
-        return row
 
 
 def parse_program(text: str, source: str = "<program>") -> Program:
@@ -144,21 +96,13 @@ def read_program(path: Path) -> Program:
     return program
 
 
+def sensors_used(rows: Opcodes) -> npt.NDArray[np.bool_]:
+    """Return which of the sensors (centre, left, right) a program's rows read, shape (3,)."""
+    used = np.zeros(3, np.bool_)
+    used[rows[np.isin(rows[:, opcodes.OP], opcodes.READING_OPS), opcodes.A]] = True
+    return used
+
+
 def mirrored(program: Program) -> Program:
     """Exchange left and right: duties and side sensors, everywhere."""
-    return Program(tuple(_mirrored(statement) for statement in program.statements))
-
-
-def _mirrored(statement: Statement) -> Statement:
-    if isinstance(statement, Motor):
-        return Motor(statement.right, statement.left, statement.time)
-    condition = _mirrored_condition(statement.condition)
-    if isinstance(statement, MotorUntil):
-        return MotorUntil(statement.right, statement.left, statement.time, condition)
-    then, otherwise = (tuple(map(_mirrored, branch)) for branch in (statement.then, statement.otherwise))
-    return If(condition, then, otherwise)
-
-
-def _mirrored_condition(condition: Condition) -> Condition:
-    sides = {Sensor.LEFT: Sensor.RIGHT, Sensor.RIGHT: Sensor.LEFT}
-    return replace(condition, sensor=sides.get(condition.sensor, condition.sensor))
+    return Program(mirror(program.statements))

@@ -4,32 +4,50 @@
     statement = "motor" "(" sum "," sum "," sum ")"
               | "motor_until" "(" sum "," sum "," sum "," condition ")"
               | "if" condition branch { "elif" condition branch } [ "else" branch ]
+              | "while" condition branch
+              | register "=" sum
+              | "reset_timer" "(" ")"
+              | "def" name "(" ")" branch | name "(" ")"
               | "pass"
     branch    = "{" program "}" | ":" block | "if" ...   (only after else: "else if" is "elif")
-    condition = sum comparison sum, one side a sensor, in any number of parentheses
-    sum       = numbers with + - * / and parentheses, worked out while reading
+    condition = both { "or" both }
+    both      = single { "and" single }
+    single    = "not" single | sum comparison sum, in any number of parentheses
+    sum       = numbers and values with + - * / and parentheses; numbers alone are worked out while reading
+    value     = sensor | sensor's previous reading | "Timer" | register
+    register  = "r0" | ... | "r7"
 
 Statements may follow each other with or without line ends and semicolons; ``#`` begins a comment. A block
 after a colon is the rest of the line or, if nothing follows there, the lines indented deeper than the line
 of its ``if``, all alike. Outside such blocks indentation means nothing. So both of the paper's ways of
 writing (Table 3, Fig. 6) are read.
 
-Duties become whole percent, times whole milliseconds and thresholds thousandths of a percent, by rounding.
+``def`` names statements; where the name is called, they stand: a macro, without arguments. It can only be called
+below, and so not by itself. `Program.source` has the statements in the place of each call.
+
+Duties become whole percent, times whole milliseconds and thresholds and numbers that the robot calculates with
+thousandths, by rounding. Times are numbers alone.
 """
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 
 from gecar.errors import InputError, expected
 from gecar.language import opcodes
-from gecar.language.expressions import Expressions
-from gecar.language.statements import Condition, If, Motor, MotorUntil, Statement
+from gecar.language.conditions import Condition
+from gecar.language.expressions import REGISTERS, Expressions
+from gecar.language.statements import If, Motor, MotorUntil, ResetTimer, Set, Statement, While
+from gecar.language.values import Value
 
 MAX_CHARACTERS = 100_000
 MAX_STATEMENTS = 10_000
 
-_STATEMENT = "motor, motor_until, if"
+_STATEMENT = "motor, motor_until, if, while, r0 = ..., reset_timer, def, a name it defined"
+_KEPT = re.compile(
+    r"(motor|motor_until|if|elif|else|while|pass|def|reset_timer|and|or|not|Timer|r[0-9]+|\w*Value)"
+)
 
 
 def parse_statements(text: str, source: str) -> tuple[Statement, ...]:
@@ -77,6 +95,8 @@ class _Parser(Expressions):
     def __init__(self, text: str, source: str, whole: bool = False) -> None:
         super().__init__(text, source, whole)
         self.statements = 0
+        self.macros: dict[str, tuple[Statement, ...]] = {}
+        self.sizes: dict[str, int] = {}
 
     def program(self) -> tuple[Statement, ...]:
         """Read statements to the end of the text."""
@@ -88,22 +108,93 @@ class _Parser(Expressions):
     def statement(self, statements: list[Statement]) -> None:
         """Read one statement, ``pass`` or semicolon, and add what it does."""
         word = self.next.text
-        self.statements += 1
-        if self.statements > MAX_STATEMENTS:
-            raise self.fault(f"a program of at most {MAX_STATEMENTS} statements")
+        self.count(1)
+        self.operations = 0
         if self.next.kind == "call":
             statements.append(_call(self.take().text))
-        elif word == "motor":
-            statements.append(self.motor())
-        elif word == "if":
-            statements.append(self.conditional())
-        elif word == "motor_until":
-            statements.append(self.motor_until())
+        elif word in self.macros:
+            statements.extend(self.called())
+        elif word == "def":
+            self.define()
         elif word in {";", "pass"}:
             self.take()
         else:
-            before = "an if before it and in line with it, or " if word in {"else", "elif"} else ""
-            raise self.fault(before + _STATEMENT)
+            statements.append(self.single())
+
+    def count(self, statements: int) -> None:
+        """Count statements, those of macros wherever they are called."""
+        self.statements += statements
+        if self.statements > MAX_STATEMENTS:
+            raise self.fault(f"a program of at most {MAX_STATEMENTS} statements")
+
+    def single(self) -> Statement:
+        """Read one statement that begins with a word of the language."""
+        word = self.next.text
+        if word in REGISTERS:
+            return self.assignment()
+        if word == "motor":
+            return self.motor()
+        if word == "if":
+            return self.conditional()
+        if word == "motor_until":
+            return self.motor_until()
+        if word == "while":
+            return self.loop()
+        if word == "reset_timer":
+            return self.reset_timer()
+        before = "an if before it and in line with it, or " if word in {"else", "elif"} else ""
+        raise self.fault(before + _STATEMENT)
+
+    def define(self) -> None:
+        """Read ``def name(): ...``."""
+        indent, before = self.line_indent, self.statements
+        self.deeper()
+        self.take()
+        name = self.next.text
+        if self.next.kind != "word" or _KEPT.fullmatch(name) or name in self.macros:
+            raise self.fault("a new name")
+        self.take()
+        self.mark("(")
+        self.mark(")")
+        statements = self.branch(indent)
+        self.macros[name], self.sizes[name] = statements, self.statements - before
+        self.depth -= 1
+
+    def called(self) -> tuple[Statement, ...]:
+        """Read ``name()``, and return what it stands for."""
+        name = self.take().text
+        self.mark("(")
+        self.mark(")")
+        self.count(self.sizes[name])
+        return self.macros[name]
+
+    def assignment(self) -> Set:
+        """Read ``r0 = sum``."""
+        register = REGISTERS[self.take().text]
+        self.mark("=")
+        start = self.next
+        return Set(register, self.value(self.sum(), start))
+
+    def reset_timer(self) -> ResetTimer:
+        """Read ``reset_timer()``."""
+        self.take()
+        self.mark("(")
+        self.mark(")")
+        return ResetTimer()
+
+    def loop(self) -> While:
+        """Read a ``while`` with its branch."""
+        indent = self.line_indent
+        self.deeper()
+        self.take()
+        condition = self.before_branch()
+        statement = While(condition, self.branch(indent))
+        self.depth -= 1
+        return statement
+
+    def before_branch(self) -> Condition:
+        """Read the condition of an ``if`` or ``while``."""
+        return _condition(self.take().text) if self.next.kind == "condition" else self.condition()
 
     def motor(self) -> Motor:
         """Read ``motor(left, right, time)``."""
@@ -121,13 +212,12 @@ class _Parser(Expressions):
         self.mark(")")
         return statement
 
-    def drive(self) -> tuple[int, int, int]:
+    def drive(self) -> tuple[int | Value, int | Value, int]:
         """Read the arguments all motor statements share."""
         self.mark("(")
-        duty = f"a duty of -{opcodes.MAX_DUTY_PCT}..{opcodes.MAX_DUTY_PCT} percent"
-        left = self.bounded(-opcodes.MAX_DUTY_PCT, opcodes.MAX_DUTY_PCT, duty)
+        left = self.duty()
         self.mark(",")
-        right = self.bounded(-opcodes.MAX_DUTY_PCT, opcodes.MAX_DUTY_PCT, duty)
+        right = self.duty()
         self.mark(",")
         return left, right, self.bounded(0, opcodes.MAX_TIME_MS, f"a time of 0..{opcodes.MAX_TIME_MS} ms")
 
@@ -136,7 +226,7 @@ class _Parser(Expressions):
         indent = self.line_indent
         self.deeper()
         self.take()
-        condition = _condition(self.take().text) if self.next.kind == "condition" else self.condition()
+        condition = self.before_branch()
         braces = self.next.text == "{"
         then = self.branch(indent)
         otherwise: tuple[Statement, ...] = ()

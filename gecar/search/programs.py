@@ -11,7 +11,7 @@ import numpy.typing as npt
 from gecar.evolution.problem import Problem, seed_of
 from gecar.evolution.scores import UNSOLVED, Floats, Scores
 from gecar.language.mapping import Derivation
-from gecar.language.opcodes import LINE, MAX_DUTY_PCT, NOT_EQUAL, A, B
+from gecar.language.opcodes import LINE, MAX_DUTY_PCT, MOTOR_UNTIL, OP, A, B
 from gecar.language.program import Program
 from gecar.search.chance import add_drives, n_times, wants_more
 from gecar.search.fitness import score_type
@@ -72,9 +72,9 @@ class RobotPrograms(Problem[Program]):
 
     def meaning(self, program: Program, derivation: Derivation | None = None) -> bytes:  # noqa: ARG002
         """Return opcodes without line numbers, duties cut at the cap."""
-        rows = program.opcodes[:, :LINE].copy()
-        cap = max(self.duty_cap_pct, NOT_EQUAL)  # what a TEST holds in these columns stays as it is
-        np.minimum(np.maximum(rows[:, A : B + 1], -cap), cap, out=rows[:, A : B + 1])
+        rows, cap = program.opcodes[:, :LINE].copy(), self.duty_cap_pct
+        drives = rows[:, OP] <= MOTOR_UNTIL
+        rows[drives, A : B + 1] = np.clip(rows[drives, A : B + 1], -cap, cap)
         return rows.tobytes()
 
     def seed(self, program: Program, digest: bytes, seed: int) -> int:  # noqa: ARG002

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.errors import expected
-from gecar.language.opcodes import N_COLUMNS, TEST
+from gecar.language.opcodes import N_COLUMNS
+from gecar.language.program import sensors_used
 from gecar.world.course.course import Course
 from gecar.world.kernel.chipmunk import NO_ENGINE
 from gecar.world.kernel.conditions import Conditions, conditions, select
@@ -334,13 +335,6 @@ class Fleet:
             result = drivers[row].simulate(opcodes, int(jobs.stream[k]))
             ends.outcome[k], ends.steps[k], ends.arrival_s[k] = result.outcome, result.steps, result.arrival_s
             ends.passed[k] = np.count_nonzero(~np.isnan(result.arrival_s))
-
-
-def sensors_used(opcodes: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
-    """Return which of the sensors (centre, left, right) a program reads, shape (3,)."""
-    used = np.zeros(3, np.bool_)
-    used[opcodes[opcodes[:, 0] == TEST, 1]] = True
-    return used
 
 
 def simulate_many(

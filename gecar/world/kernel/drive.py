@@ -142,6 +142,10 @@ def begin_program(k: Any, phase_ms: float, dt: float, s: Any, p: Any, floor: Flo
     k.due_ms = phase_ms
     k.due_step = first_step_after(phase_ms, dt)
     k.left_duty = k.right_duty = 0.0
+    k.turned, k.turned_ms = -1, -1.0
+    k.changed = k.timer_ms = 0
+    k.registers[:] = 0
+    k.previous[:] = 0
     k.tile = tile_at(s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin, floor)
 
 

@@ -8,16 +8,45 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import kernel
-from gecar.language.opcodes import EQUAL, JUMP, MOTOR_UNTIL, TEST
+from gecar.compiled import kernel, subroutine
+from gecar.language.opcodes import (
+    ADD,
+    COMPARE,
+    CONSTANT,
+    DRIVE,
+    EQUAL,
+    HOLD,
+    JUMP,
+    LOOP,
+    MAX_DUTY_PCT,
+    MAX_VALUE,
+    MOTOR_UNTIL,
+    MULTIPLY,
+    N_REGISTERS,
+    ONE,
+    PREVIOUS,
+    READING,
+    REGISTER,
+    REMEMBER,
+    RESET_TIMER,
+    SET,
+    STACK,
+    SUBTRACT,
+    TEST,
+)
 from gecar.random_streams import LARGEST_NORMAL, normal, skip_normal
 from gecar.world.kernel.sensing import RING, delayed, glance, lag_keep, lagged, reported
 from gecar.world.kernel.terms import colour_error
 
 # Where the program stands. `due_ms` is the schedule the program asks for; steps round it, but never add up errors.
+# Of programs with memory: the last row of a loop that turned, and the schedule then; whether memory changed since the
+# program last waited for taking no time; when the timer began [ms]; registers, what sensors reported before, the stack.
 CONTROL = np.dtype(
     [(field, np.int64) for field in ("row", "until", "due_step", "step", "line", "tile")]
     + [(field, np.float64) for field in ("due_ms", "left_duty", "right_duty")]
+    + [("turned_ms", np.float64)]
+    + [(field, np.int64) for field in ("turned", "changed", "timer_ms")]
+    + [("registers", np.int64, (N_REGISTERS,)), ("previous", np.int64, (3,)), ("stack", np.int64, (STACK,))]
 )
 
 
@@ -147,13 +176,126 @@ def test_row(
 
 
 @kernel
+def held(value: int) -> int:
+    """Return a number within the range of calculation."""
+    return min(max(value, -MAX_VALUE), MAX_VALUE)
+
+
+@kernel
+def arithmetic(op: int, left: int, right: int) -> int:
+    """Return what an operation gives [thousandths], from two numbers within the range of calculation."""
+    if op == ADD:
+        return held(left + right)
+    if op == SUBTRACT:
+        return held(left - right)
+    if op == MULTIPLY:
+        return held(left * right // ONE)
+    if right == 0:
+        return held(left * MAX_VALUE)
+    return held(left * ONE // right)
+
+
+@kernel
+def _elapsed(k: Any, dt: float) -> int:
+    """Return the whole milliseconds since the timer began."""
+    return math.floor(1000.0 * dt * k.step + 1e-6) - k.timer_ms
+
+
+@kernel
+def _keep(numbers: npt.NDArray[np.int64], which: int, number: int, k: Any) -> None:
+    """Put a number into memory."""
+    if numbers[which] != number:
+        numbers[which] = number
+        k.changed = 1
+
+
+@subroutine
+def calculate(  # noqa: C901, PLR0912
+    program: npt.NDArray[np.int32], row: int, k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
+) -> int:
+    """Run rows from one on, as long as they only calculate; return the row after them.
+
+    What a DRIVE takes is then at the beginning of the stack.
+    """
+    stack, top = k.stack, 0
+    seen, level = -1, 0.0
+    while row < program.shape[0]:
+        op, a = program[row, 0], program[row, 1]
+        if op < CONSTANT or op > REMEMBER:
+            break
+        row += 1
+        if op in (READING, REMEMBER):
+            if a != seen:  # a sensor asked twice in one moment only draws its noise twice
+                seen, level = a, reflection(a, k.step, s, p, dt, floor, eyes)
+            noise = eyes.noise_pct * normal(eyes) if eyes.noise_pct > 0.0 else 0.0
+            reading = int(reported(level, noise, p)) * ONE
+            if op == READING:
+                stack[top] = reading
+                top += 1
+            else:
+                _keep(k.previous, a, reading, k)
+        elif ADD <= op <= COMPARE:
+            right = int(program[row - 1, 3])
+            if a == 0:
+                top -= 1
+                right = stack[top]
+            if op < COMPARE:
+                stack[top - 1] = arithmetic(op, stack[top - 1], right)
+            else:
+                top -= 1
+                if not holds(stack[top], program[row - 1, 2], right):
+                    row = program[row - 1, 4]
+        elif op == SET:
+            top -= 1
+            _keep(k.registers, a, stack[top], k)
+        elif op == RESET_TIMER:
+            k.timer_ms += _elapsed(k, dt)
+        else:
+            stack[top] = _pushed(op, a, program[row - 1, 3], k, dt)
+            top += 1
+    return row
+
+
+@kernel
+def _pushed(op: int, a: int, c: int, k: Any, dt: float) -> int:
+    """Return what a CONSTANT, PREVIOUS, TIMER or REGISTER pushes."""
+    if op == CONSTANT:
+        return c
+    if op == REGISTER:
+        return k.registers[a]
+    if op == PREVIOUS:
+        return k.previous[a]
+    k.changed = 1  # soon it will have
+    return held(_elapsed(k, dt) * ONE)
+
+
+@kernel
+def _until_holds(
+    program: npt.NDArray[np.int32], k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
+) -> bool:
+    """Whether what the motors turn until holds now: the test of a MOTOR_UNTIL, or the rows after a DRIVE."""
+    row = k.until
+    if program[row - 1, 0] == MOTOR_UNTIL:
+        return test_row(program, row, k, s, p, dt, floor, eyes)
+    end = program[row - 1, 4]
+    while row < end and program[row, 0] != HOLD:
+        if program[row, 0] == TEST:
+            row = row + 1 if test_row(program, row, k, s, p, dt, floor, eyes) else program[row, 4]
+        elif program[row, 0] == JUMP:
+            row = program[row, 4]
+        else:
+            row = calculate(program, row, k, s, p, dt, floor, eyes)
+    return row >= end
+
+
+@kernel
 def _goes_on(
     program: npt.NDArray[np.int32], k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
-    """Whether the wait is over: by time, or by the test of a MOTOR_UNTIL."""
+    """Whether the wait is over: by time, or by what the motors turn until."""
     if k.until < 0:
         return k.step >= k.due_step
-    if k.step < k.due_step and not test_row(program, k.until, k, s, p, dt, floor, eyes):
+    if k.step < k.due_step and not _until_holds(program, k, s, p, dt, floor, eyes):
         return False
     k.due_ms = min(k.due_ms, 1000.0 * dt * k.step)
     k.until = -1
@@ -167,10 +309,10 @@ def first_step_after(due_ms: float, dt: float) -> int:
 
 
 @kernel
-def run_program(
+def run_program(  # noqa: C901
     program: npt.NDArray[np.int32], k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
-    """Run statements until the robot waits again; a pass that takes no time waits for the next step.
+    """Run statements until the robot waits again; one step, if a pass or a loop's turn takes no time.
 
     Returns
     -------
@@ -189,6 +331,11 @@ def run_program(
             k.row = k.row + 1 if test_row(program, k.row, k, s, p, dt, floor, eyes) else target
         elif program[k.row, 0] == JUMP:
             k.row = program[k.row, 4]
+        elif CONSTANT <= program[k.row, 0] <= REMEMBER:
+            k.row = calculate(program, k.row, k, s, p, dt, floor, eyes)
+        elif program[k.row, 0] == LOOP:
+            if _turns_in_no_time(program, k):
+                break
         elif _command(program, k, eyes):
             passes = 0
             k.due_step = first_step_after(k.due_ms, dt)
@@ -196,25 +343,52 @@ def run_program(
                 return True
     k.due_step = k.step + 1
     k.due_ms = 1000.0 * dt * k.due_step
-    return not _stands_for_ever(k, s, eyes)
+    if passes < 2:
+        k.turned_ms = k.due_ms
+    stuck = _stands_for_ever(k, s, eyes)
+    k.changed = 0
+    return not stuck
+
+
+@kernel
+def _turns_in_no_time(program: npt.NDArray[np.int32], k: Any) -> bool:
+    """Go back to the loop's first row; return whether this loop, or one around it, has turned since time passed.
+
+    The ends of loops stand in the order in which loops can turn one after the other: those within before those around.
+    """
+    row, k.row = k.row, program[k.row, 4]
+    again = row <= k.turned and k.due_ms == k.turned_ms
+    k.turned, k.turned_ms = row, k.due_ms
+    return again
 
 
 @kernel
 def _stands_for_ever(k: Any, s: Any, eyes: Any) -> bool:
     """Whether a robot whose program takes no time stands without command and noise, so that nothing changes."""
     still = s.vx == 0.0 and s.vy == 0.0 and s.yaw_rate == 0.0 and s.left_speed == 0.0 and s.right_speed == 0.0
-    return still and k.left_duty == 0.0 and k.right_duty == 0.0 and eyes.noise_pct == 0.0
+    quiet = k.left_duty == 0.0 and k.right_duty == 0.0 and eyes.noise_pct == 0.0
+    return still and quiet and k.changed == 0
+
+
+@kernel
+def _share(duty: int) -> float:
+    """Return a duty [thousandths of a percent] as a share, rounded to a whole percent and within bounds."""
+    return min(max((duty + ONE // 2) // ONE, -MAX_DUTY_PCT), MAX_DUTY_PCT) / 100.0
 
 
 @kernel
 def _command(program: npt.NDArray[np.int32], k: Any, eyes: Any) -> bool:
-    """Run the MOTOR or MOTOR_UNTIL the program stands at; return whether it takes time."""
+    """Run the MOTOR, MOTOR_UNTIL or DRIVE the program stands at; return whether it takes time."""
     row = k.row
-    until = program[row, 0] == MOTOR_UNTIL
-    k.row = row + 2 if until else row + 1
     k.line = program[row, 5]
-    k.left_duty = program[row, 1] / 100.0
-    k.right_duty = program[row, 2] / 100.0
+    if program[row, 0] == DRIVE:
+        until = program[row, 2] != 0
+        k.row = program[row, 4] if until else row + 1
+        k.left_duty, k.right_duty = _share(k.stack[0]), _share(k.stack[1])
+    else:
+        until = program[row, 0] == MOTOR_UNTIL
+        k.row = row + 2 if until else row + 1
+        k.left_duty, k.right_duty = program[row, 1] / 100.0, program[row, 2] / 100.0
     if eyes.motor_noise > 0.0:
         k.left_duty *= 1.0 + eyes.motor_noise * normal(eyes)
         k.right_duty *= 1.0 + eyes.motor_noise * normal(eyes)
