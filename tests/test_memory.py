@@ -23,7 +23,7 @@ from gecar.language.robot_language import check_robot_language
 from gecar.language.statements import If, Motor, MotorUntil, ResetTimer, Set, While
 from gecar.language.values import Constant, Operation, Operator, Previous, Reading, Register, Sensor, Timer
 from gecar.world.course.course import load_course
-from gecar.world.kernel.interpreter import arithmetic
+from gecar.world.kernel.calculation import arithmetic
 from gecar.world.perturbation import drawn_conditions
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Driver, Fleet, Outcome, World, simulate

@@ -18,7 +18,8 @@ from gecar.world.kernel.chipmunk import NO_ENGINE
 from gecar.world.kernel.conditions import Conditions, conditions, select
 from gecar.world.kernel.drive import Setup, drive
 from gecar.world.kernel.dynamics import has_terms
-from gecar.world.kernel.interpreter import CONTROL, EYES, Floor
+from gecar.world.kernel.eyes import EYES, Floor
+from gecar.world.kernel.interpreter import CONTROL
 from gecar.world.kernel.lanes import Ends, Jobs, drive_lanes, make_memory
 from gecar.world.kernel.sensing import RING
 from gecar.world.kernel.state import STATE

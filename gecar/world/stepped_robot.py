@@ -6,7 +6,7 @@ import numpy as np
 
 from gecar.random_streams import normal
 from gecar.world.kernel.drive import hold_duties
-from gecar.world.kernel.interpreter import read_sensor
+from gecar.world.kernel.eyes import read_sensor
 from gecar.world.rollout import Driver, World
 
 

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from gecar.compiled import kernel, on_stack
 from gecar.world.kernel.chipmunk import SPACE, EngineArrays, engine_step
 from gecar.world.kernel.dynamics import drift, has_terms, step, step_with_terms, turn
-from gecar.world.kernel.interpreter import Floor, first_step_after, look, run_program, see
+from gecar.world.kernel.eyes import Floor, look, see
+from gecar.world.kernel.interpreter import first_step_after, run_program
 from gecar.world.kernel.sensing import RING, delayed
 from gecar.world.kernel.state import place
 

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from gecar.compiled import kernel, lane_access
 from gecar.world.kernel.conditions import Conditions
 from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, begin_program, enter_tile
-from gecar.world.kernel.interpreter import CONTROL, EYES, Floor, look, run_program
+from gecar.world.kernel.eyes import EYES, Floor, look
+from gecar.world.kernel.interpreter import CONTROL, run_program
 from gecar.world.kernel.lock_step import (
     LANES,
     N_FIELDS,
