@@ -157,6 +157,7 @@ def test_the_same_rows_are_the_same_program_whatever_the_lines() -> None:
         ("def f() { f() }", "found 'f', expected motor, motor_until, if"),
         ("def r0() {}", "found 'r0', expected a new name"),
         ("def f() {} def f() {}", "column 16: found 'f', expected a new name"),
+        ("def a(){" + "motor(-10,-10,10000)" * 80 + "}" + "a()" * 99, "characters, macros written out"),
         ("def a(){" + "pass;" * 99 + "}" + "a();" * 99, "expected a program of at most 10000 statements"),
         ("motor(1/0,2,1)", "column 9: found '0', expected a divisor other than 0"),
         ("motor(99999999999999,2,1)", "expected numbers and divisors up to a million million"),
@@ -259,9 +260,33 @@ def test_a_mirror_image_s_mirror_image_is_the_program(program: Program) -> None:
     assert [row[:2] for row in mirrored(Program((Motor(1, 2, 3),))).opcodes[:, 1:3].tolist()] == [[2, 1]]
 
 
-words = st.sampled_from(
-    ["motor", "motor_until", "if", "else", "elif", "SensorValue", *"(){}:;,<>+-*/", "\n", " ", "\n  ", "5"]
-)
+table_3 = [
+    "motor",
+    "motor_until",
+    "if",
+    "else",
+    "elif",
+    "SensorValue",
+    *"(){}:;,<>+-*/",
+    "\n",
+    " ",
+    "\n  ",
+    "5",
+]
+memory = [
+    "while ",
+    "def f()",
+    "f()",
+    "reset_timer()",
+    "Timer",
+    "PreviousValue",
+    "r0",
+    "r1 = ",
+    " and ",
+    " or ",
+    "not ",
+]
+words = st.sampled_from(table_3 + memory)
 
 
 @given(st.lists(words | st.text(max_size=2), max_size=30).map("".join))

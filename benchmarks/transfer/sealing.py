@@ -11,6 +11,7 @@ from typing import Any
 
 from gecar.errors import InputError, expected
 from gecar.files import read_text, write_whole
+from gecar.language.opcodes import JUMP
 from gecar.language.program import parse_program
 from gecar.results.config import configure, read_config
 from gecar.results.run import load_task
@@ -53,6 +54,8 @@ class Winner:
     def rows(self) -> list[list[int]]:
         """The program as opcode rows."""
         rows: list[list[int]] = parse_program(self.program).opcodes.tolist()
+        if any(row[0] > JUMP for row in rows):
+            raise expected(self.source, "a program with memory", "one of Table 3's language")
         return rows
 
     def in_gecar(self) -> Drive:

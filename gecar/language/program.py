@@ -16,7 +16,7 @@ from gecar.language.layout import Layout
 from gecar.language.mirror import mirror
 from gecar.language.source_position import plain
 from gecar.language.statements import Statement
-from gecar.language.syntax import parse_statements
+from gecar.language.syntax import MAX_CHARACTERS, parse_statements
 from gecar.language.values import Sensor
 
 Opcodes = npt.NDArray[np.int32]
@@ -79,7 +79,11 @@ def parse_program(text: str, source: str = "<program>") -> Program:
         If it is no program, or longer than 100,000 characters, than 10,000 statements or nested deeper than
         100; the message names line and column, what is there and what should be.
     """
-    return Program(parse_statements(plain(text), source))
+    program = Program(parse_statements(plain(text), source))
+    if "def" in text and len(program.source) > MAX_CHARACTERS:
+        found = f"{len(program.source)} characters, macros written out"
+        raise expected(source, found, f"a program of at most {MAX_CHARACTERS}")
+    return program
 
 
 def read_program(path: Path) -> Program:

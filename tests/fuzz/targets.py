@@ -126,7 +126,8 @@ TARGETS: dict[str, Callable[[bytes, Path], None]] = {
 
 WORDS = {
     "grammar": '<code> ::= | "motor(" \\n GE_RANGE: # <a> <b> \' \\ <=',
-    "program": "motor( motorUntil( if( if else { } == <= AND OR NOT && ( ) SensorValue(0) int( ; \t - * 100,",
+    "program": "motor( motorUntil( if( if else { } == <= AND OR NOT && ( ) SensorValue(0) int( ; \t - * 100, "
+    "while( r0 = r7 PreviousValue Timer reset_timer() def f() f() and or not( 0.4 / 0 99999",
     "course": 'map=\'\'\' goal=[ [start] tile=[ heading="up" [[walls]] from_m=[ to_m=[ [[obstacles]] at_m=[ kind="box" '
     'kind="disc" size_m=[ diameter_m= heading_deg= mass_kg= movable=false checkpoints=[ tile_size_m= field_m=[ '
     "line_width_m= [image] file= pixels_per_metre= marks_px=[ marks_m=[ F- 7 L J | # . + > < = : ~ S [ ] 1e308 inf",
