@@ -140,6 +140,8 @@ class SimulatedBrick:
 
     def on_print(self, line):
         self.printed.append(line)
+        if line.startswith("# "):  # a SPIKE hub's screen is the terminal
+            self.on_show(line[2:])
 
     def on_log(self, name, line):
         self.files[name] = self.files.get(name, "") + line + "\n"
@@ -155,10 +157,14 @@ class SimulatedBrick:
 
 
 def run_on(brick, main, tmp_path):
-    """Run a main.py on a simulated brick to its end; return the error it ended with, or None."""
+    """Run a main.py on a simulated brick to its end; return the error it ended with, or None.
+
+    It has the memory of the real one: a megabyte on an EV3 under 2.0, a quarter of one on a SPIKE hub.
+    """
     path = tmp_path / "main.py"
     path.write_text(main, newline="")
-    command = ["node", str(NODE / "brick.mjs"), str(path)]
+    heap = 256 * 1024 if "PrimeHub" in main else 1024 * 1024
+    command = ["node", str(NODE / "brick.mjs"), str(path), str(heap)]
     node = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
     try:
         for line in node.stdout:

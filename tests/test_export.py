@@ -8,9 +8,10 @@ import brick
 import numpy as np
 import pytest
 
-from gecar.brick.export import TARGETS, Ports, export_program
+from gecar.brick.export import TARGETS, Ports, SpikePorts, default_ports, export_program
 from gecar.errors import InputError
 from gecar.language.program import parse_program
+from gecar.language.values import Sensor
 from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
 from gecar.reality.recordings.setup import Setup
 from gecar.world.course.course import load_course
@@ -42,7 +43,10 @@ def lap(world):
 
 
 def main_of(text, robot, target="pybricks2", **ports):
-    return export_program(parse_program(text), robot, target, Ports(**ports))["main.py"]
+    """The simulated robot's motors are at B and C, whatever brick it has."""
+    if target == "spike":
+        ports = {"left_motor": "B", "right_motor": "C", "sensor": "D", "left_sensor": "E", **ports}
+    return export_program(parse_program(text), robot, target, default_ports(target)(**ports))["main.py"]
 
 
 # --- the text
@@ -101,12 +105,13 @@ def test_visual_studio_code_finds_how_to_run_it(robot):
     assert launch["program"] == "/home/robot/${workspaceRootFolderName}/main.py"
     assert json.loads(files[".vscode/settings.json"])["files.eol"] == "\n"
     assert list(export_program(parse_program(LAP), robot, "pybricks4")) == ["main.py"]
+    assert list(export_program(parse_program(LAP), robot, "spike")) == ["main.py"]
 
 
 @pytest.mark.parametrize(
     ("text", "target", "message"),
     [
-        (LAP, "pybricks3", "found 'pybricks3', expected pybricks2 or pybricks4"),
+        (LAP, "pybricks3", "found 'pybricks3', expected one of pybricks2, pybricks4, spike"),
         ("", "pybricks2", "found 0 statements, expected 1 to 1000"),
         ("motor(1,1,1)\n" * 1001, "pybricks2", "found 1001 statements"),
     ],
@@ -114,6 +119,12 @@ def test_visual_studio_code_finds_how_to_run_it(robot):
 def test_what_can_not_be_exported_is_refused(robot, text, target, message):
     with pytest.raises(InputError, match=message):
         main_of(text, robot, target)
+
+
+def test_a_spike_hub_has_the_same_ports_for_all():
+    assert SpikePorts(left_motor="-F", sensor="A").of(Sensor.CENTRE) == "A"
+    with pytest.raises(InputError, match="port of sensor: found '3', expected A, B, C, D, E or F"):
+        SpikePorts(sensor="3")
 
 
 @pytest.mark.parametrize(("name", "port"), [("left_motor", "E"), ("sensor", "5"), ("right_motor", "")])
@@ -165,7 +176,7 @@ def test_exported_program_laps_the_course_as_simulated(robot, world, lap, tmp_pa
     assert brick.run_on(played, main_of(text, robot, target), tmp_path) is None
     assert played.arrival_s == pytest.approx(simulated.time_s, rel=0.01)
     log = tmp_path / "log.csv"
-    log.write_text("\n".join(played.printed) if target == "pybricks4" else played.files["gecar_log_2026.csv"])
+    log.write_text("\n".join(played.printed) if target != "pybricks2" else played.files["gecar_log_2026.csv"])
     (imported,) = import_logs([log], robot, Setup(), ImportOptions())
     assert imported.repairs == ()
     assert "white, black: [(100, 0)]" in imported.recording.setup.notes
@@ -203,7 +214,7 @@ def test_calibration_is_kept_for_the_next_time(robot, tmp_path, target):
         main = main.replace("\nrun()\n", "\nrun()\ncalibration = []\nclock = StopWatch()\nrun()\n")
     played = brick.SimulatedBrick(white=55, black=5)
     assert brick.run_on(played, main, tmp_path) is None
-    if target == "pybricks4":
+    if target != "pybricks2":
         again = brick.SimulatedBrick(white=55, black=5)
         again.storage = played.storage
         assert brick.run_on(again, main, tmp_path) is None

@@ -1,4 +1,4 @@
-"""Write a program as the files that a person copies to a LEGO EV3."""
+"""Write a program as the files that a person copies to a LEGO EV3 or SPIKE hub."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from gecar.brick import calibration_template, main_template
 from gecar.brick.memory_template import keeping_text, memory_text, registers_set
@@ -16,7 +17,7 @@ from gecar.language.statements import If, Statement, While
 from gecar.language.values import Sensor
 from gecar.world.robot import Robot
 
-TARGETS = ("pybricks2", "pybricks4")
+TARGETS = ("pybricks2", "pybricks4", "spike")
 TIME_LIMIT_S = 60  # the paper's
 MOST_STATEMENTS = 1000  # MicroPython's jumps reach 32 kB: an if of more statements would not compile
 MOST_ROWS = 3000  # for the same reason, those of calculation counted
@@ -30,7 +31,7 @@ _CONSTANTS = {
 
 @dataclass(frozen=True)
 class Ports:
-    """Where motors and sensors are plugged in.
+    """Where motors and sensors are plugged in on an EV3.
 
     Attributes
     ----------
@@ -40,6 +41,10 @@ class Ports:
         ``1`` to ``4``; only those that the program reads matter.
     """
 
+    motors: ClassVar = "ABCD"
+    sensors: ClassVar = "1234"
+    sensor_prefix: ClassVar = "S"
+
     left_motor: str = "B"
     right_motor: str = "C"
     sensor: str = "3"
@@ -48,19 +53,41 @@ class Ports:
 
     def __post_init__(self) -> None:
         for name in ("left_motor", "right_motor"):
-            if not re.fullmatch("-?[A-D]", getattr(self, name)):
-                raise expected(
-                    f"port of {name}", repr(getattr(self, name)), "A, B, C or D, or with a minus before it"
-                )
+            if not re.fullmatch(f"-?[{self.motors}]", getattr(self, name)):
+                ports = f"{_one_of(self.motors)}, or with a minus before it"
+                raise expected(f"port of {name}", repr(getattr(self, name)), ports)
         for name in ("sensor", "left_sensor", "right_sensor"):
-            if getattr(self, name) not in ("1", "2", "3", "4"):
-                raise expected(f"port of {name}", repr(getattr(self, name)), "1, 2, 3 or 4")
+            if not re.fullmatch(f"[{self.sensors}]", getattr(self, name)):
+                raise expected(f"port of {name}", repr(getattr(self, name)), _one_of(self.sensors))
 
     def of(self, sensor: Sensor) -> str:
         """Return a sensor's port."""
         return {Sensor.CENTRE: self.sensor, Sensor.LEFT: self.left_sensor, Sensor.RIGHT: self.right_sensor}[
             sensor
         ]
+
+
+@dataclass(frozen=True)
+class SpikePorts(Ports):
+    """Where motors and sensors are plugged in on a SPIKE or Robot Inventor hub: ``A`` to ``F`` for all."""
+
+    left_motor: str = "-A"
+    right_motor: str = "B"
+    sensor: str = "C"
+    left_sensor: str = "D"
+    right_sensor: str = "E"
+    motors: ClassVar = "ABCDEF"
+    sensors: ClassVar = "ABCDEF"
+    sensor_prefix: ClassVar = ""
+
+
+def _one_of(letters: str) -> str:
+    return f"{', '.join(letters[:-1])} or {letters[-1]}"
+
+
+def default_ports(target: str) -> type[Ports]:
+    """Return the ports that a target's hub has."""
+    return SpikePorts if target == "spike" else Ports
 
 
 def export_program(program: Program, robot: Robot, target: str, ports: Ports | None = None) -> dict[str, str]:
@@ -74,9 +101,10 @@ def export_program(program: Program, robot: Robot, target: str, ports: Ports | N
         For its wheels, its track, its cap on duty and the sensor levels its thresholds are meant for.
     target
         ``"pybricks2"``: LEGO's EV3 MicroPython 2.0, started from its menu or from Visual Studio Code.
-        ``"pybricks4"``: Pybricks 4, started from Pybricks Code.
+        ``"pybricks4"``: Pybricks 4, started from Pybricks Code. ``"spike"``: Pybricks 3 or newer on a SPIKE Prime or
+        Robot Inventor hub.
     ports
-        Where motors and sensors are plugged in.
+        Where motors and sensors are plugged in; default: `Ports`, or `SpikePorts`.
 
     Returns
     -------
@@ -89,7 +117,7 @@ def export_program(program: Program, robot: Robot, target: str, ports: Ports | N
         If there is no such target, or the program is empty or too long for a brick.
     """
     if target not in TARGETS:
-        raise expected("target", repr(target), " or ".join(TARGETS))
+        raise expected("target", repr(target), f"one of {', '.join(TARGETS)}")
     statements = sum(1 for _ in _all(program.statements))
     if not 1 <= statements <= MOST_STATEMENTS:
         raise expected("program", f"{statements} statements", f"1 to {MOST_STATEMENTS}, to fit on a brick")
@@ -97,7 +125,7 @@ def export_program(program: Program, robot: Robot, target: str, ports: Ports | N
         raise expected(
             "program", f"{len(program.opcodes)} rows of opcodes", f"at most {MOST_ROWS}, to fit on a brick"
         )
-    files = {"main.py": _main(program, robot, target, ports or Ports())}
+    files = {"main.py": _main(program, robot, target, ports or default_ports(target)())}
     return files | _vs_code() if target == "pybricks2" else files
 
 
@@ -123,8 +151,9 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
     )
     words = (
         _robot_words(robot, ports)
+        | _hub_words(target)
         | _sensor_words(sensors, ports)
-        | _log_words(second, Sensor.CENTRE in sensors)
+        | _log_words(target, Sensor.CENTRE in sensors)
         | {"MEMORY": memory_text(program), "KEEP_READINGS": keeping_text(program)}
     )
     for name, word in words.items():
@@ -160,14 +189,37 @@ def _sensor_words(sensors: Sequence[Sensor], ports: Ports) -> dict[str, str]:
     functions = [f"def {READERS[sensor]}():\n    return reading({k})\n\n" for k, sensor in enumerate(sensors)]
     light = sensors.index(Sensor.CENTRE) if Sensor.CENTRE in sensors else None
     return {
-        "SENSOR_PORTS": "\n".join(f"{_CONSTANTS[sensor]} = Port.S{ports.of(sensor)}" for sensor in sensors),
+        "SENSOR_PORTS": "\n".join(
+            f"{_CONSTANTS[sensor]} = Port.{ports.sensor_prefix}{ports.of(sensor)}" for sensor in sensors
+        ),
         "SENSORS": "[" + ", ".join(f"ColorSensor({_CONSTANTS[sensor]})" for sensor in sensors) + "]",
         "SENSOR_FUNCTIONS": "\n".join(functions),
         "LIGHT": "0" if light is None else f"reading({light})",
     }
 
 
-def _log_words(second: bool, with_light: bool) -> dict[str, str]:
+def _hub_words(target: str) -> dict[str, str]:
+    """Return what the hub's hardware needs."""
+    if target != "spike":
+        return {
+            "DEVICES": "ev3devices",
+            "HUB": "EV3Brick",
+            "STOP_BUTTON": "Back",
+            "STOP_SETTING": "",
+            "SAY": main_template.SAY_ON_SCREEN,
+            "ROW_MS": "10",
+        }
+    return {
+        "DEVICES": "pupdevices",
+        "HUB": "PrimeHub",
+        "STOP_BUTTON": "Bluetooth",
+        "STOP_SETTING": "hub.system.set_stop_button(Button.BLUETOOTH)  # or CENTER would end the program\n",
+        "SAY": main_template.SAY_IN_TERMINAL,
+        "ROW_MS": "20",  # the hub has a quarter of a megabyte for a log of 17 bytes a row
+    }
+
+
+def _log_words(target: str, with_light: bool) -> dict[str, str]:
     """Return how the log is written: names as `gecar.reality.recordings.columns` has them."""
     light = ['"reflection_pct"'] if with_light else []
     columns = [
@@ -184,7 +236,7 @@ def _log_words(second: bool, with_light: bool) -> dict[str, str]:
     )
     words = {"COLUMNS": ", ".join(columns) + ","}
     remark = '"# white, black: " + str(calibration)'
-    if second:
+    if target == "pybricks2":
         return words | {
             "TITLE": "Drives a LEGO EV3 with EV3 MicroPython 2.0 (Pybricks).",
             "HOW_TO_START": "Copy this folder to the brick (Visual Studio Code: F5) and start main.py.",
@@ -195,8 +247,10 @@ def _log_words(second: bool, with_light: bool) -> dict[str, str]:
             "WRITE_ROW": f"log.log({values})",
         }
     return words | {
-        "TITLE": "Drives a LEGO EV3 with Pybricks 4.",
-        "HOW_TO_START": "Open it in Pybricks Code and start it there, with the brick connected.",
+        "TITLE": "Drives a LEGO SPIKE Prime or Robot Inventor hub with Pybricks 3 or newer."
+        if target == "spike"
+        else "Drives a LEGO EV3 with Pybricks 4.",
+        "HOW_TO_START": "Open it in Pybricks Code and start it there, with the hub connected.",
         "HOW_TO_GET_THE_LOG": "The run is printed: copy the terminal's text into a file, which gecar import reads.",
         "TOOLS": "StopWatch, wait",
         "BEFORE_SAVING": '    say("Connect again,", "CENTER prints", "the log.")\n    wait_for(Button.CENTER)',

@@ -1,8 +1,9 @@
 """The text of main.py around the program: MicroPython 1.11, so no f-strings and nothing newer.
 
-Words in double brackets are filled in by `gecar.brick.export`. Facts that shaped it: the ``Back`` button ends a
-program at once, unsaved; ``print`` and the log's file take milliseconds a line, so the run is kept in memory, 17 bytes
-a row, and written after it, which also leaves little for the garbage collector to stop the robot for.
+Words in double brackets are filled in by `gecar.brick.export`. Facts that shaped it: the ``Back`` button (on a SPIKE hub
+the Bluetooth button) ends a program at once, unsaved; ``print`` and the log's file take milliseconds a line, so the run
+is kept in memory, 17 bytes a row, and written after it, which also leaves little for the garbage collector to stop the
+robot for.
 """
 
 SHEBANG = "#!/usr/bin/env pybricks-micropython\n"
@@ -13,14 +14,14 @@ Made by gecar export. [[HOW_TO_START]]
 
 1. The first time, or on LEFT: put the colour sensor over bare floor and then over the line, with CENTER each time.
 2. Put the robot on START and press CENTER. It drives [[LIMIT]] s at most, or until a button is pressed.
-   (Not the Back button: it ends the program at once, and the log is lost.)
+   (Not the [[STOP_BUTTON]] button: it ends the program at once, and the log is lost.)
 3. [[HOW_TO_GET_THE_LOG]]
 """
 
 from ustruct import calcsize, pack_into, unpack_from
 
-from pybricks.ev3devices import ColorSensor, Motor
-from pybricks.hubs import EV3Brick
+from pybricks.[[DEVICES]] import ColorSensor, Motor
+from pybricks.hubs import [[HUB]]
 from pybricks.parameters import Button, Direction, Port
 from pybricks.tools import [[TOOLS]]
 
@@ -39,15 +40,29 @@ WHITE_PCT = [[WHITE]]
 BLACK_PCT = [[BLACK]]
 
 TIME_LIMIT_MS = [[LIMIT]]000
-ROW_MS = 10
+ROW_MS = [[ROW_MS]]
 
 
 '''
 
+SAY_ON_SCREEN = '''def say(*lines):
+    """Show lines on the brick's screen."""
+    hub.screen.clear()
+    for line in lines:
+        hub.screen.print(line)
+'''
+
+SAY_IN_TERMINAL = '''def say(*lines):
+    """Print lines in Pybricks Code, as remarks of the log, and show the first letter on the hub."""
+    hub.display.char(lines[0][0])
+    for line in lines:
+        print("# " + line)
+'''
+
 DRIVING = '''
 
-hub = EV3Brick()
-left_motor = Motor(LEFT_MOTOR, LEFT_FORWARD)
+hub = [[HUB]]()
+[[STOP_SETTING]]left_motor = Motor(LEFT_MOTOR, LEFT_FORWARD)
 right_motor = Motor(RIGHT_MOTOR, RIGHT_FORWARD)
 sensors = [[SENSORS]]
 calibration = []  # what each sensor reads over bare floor and over the line
@@ -166,12 +181,7 @@ def save_log():
         [[WRITE_ROW]]
 
 
-def say(*lines):
-    """Show lines on the brick's screen."""
-    hub.screen.clear()
-    for line in lines:
-        hub.screen.print(line)
-
+[[SAY]]
 
 def wait_for(*buttons):
     """Wait until one of some buttons is pressed and let go, and return it; one held from before does not count."""
@@ -236,7 +246,7 @@ def run():
         if wait_for(Button.CENTER, Button.LEFT) == Button.CENTER:
             break
         calibrate()
-    say("Any button stops.", "Not Back: that", "loses the log.")
+    say("Any button stops.", "Not [[STOP_BUTTON]]: that", "loses the log.")
     for sensor in sensors:
         sensor.reflection()  # the first reading switches its light on, which takes a while
     wait(500)

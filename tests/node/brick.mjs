@@ -29,7 +29,7 @@ function call(text) {
 }
 
 const micropython = await loadMicroPython({
-    heapsize: 1024 * 1024, // the brick's, under 2.0
+    heapsize: Number(process.argv[3]),
     stdout: (line) => call(JSON.stringify(["print", line])),
     linebuffer: true,
 });

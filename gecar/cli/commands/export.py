@@ -26,8 +26,9 @@ def export(
     ],
     target: Annotated[
         str,
-        typer.Option("--target", metavar="pybricks2|pybricks4",
-                     help="Firmware of the brick: pybricks2 (EV3 MicroPython 2.0) or pybricks4."),
+        typer.Option("--target", metavar="pybricks2|pybricks4|spike",
+                     help="pybricks2: EV3 MicroPython 2.0; pybricks4: Pybricks 4 on an EV3; spike: Pybricks on a SPIKE "
+                          "Prime or Robot Inventor hub."),
     ] = "pybricks2",
     robot: RobotOption = None,
     out: Annotated[
@@ -35,11 +36,14 @@ def export(
         typer.Option("--out", metavar="FOLDER", help="Output folder.", show_default="brick"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    left_motor: Annotated[str, _port("left-motor", "A to D; -B if the motor is mounted in reverse.")] = "B",
-    right_motor: Annotated[str, _port("right-motor", "A to D, likewise.")] = "C",
-    sensor: Annotated[str, _port("sensor", "1 to 4: SensorValue.")] = "3",
-    left_sensor: Annotated[str, _port("left-sensor", "1 to 4: LeftSensorValue.")] = "2",
-    right_sensor: Annotated[str, _port("right-sensor", "1 to 4: RightSensorValue.")] = "4",
+    left_motor: Annotated[
+        str | None,
+        _port("left-motor", "EV3: A to D (B); SPIKE: A to F (-A). With a minus: mounted in reverse."),
+    ] = None,
+    right_motor: Annotated[str | None, _port("right-motor", "Likewise (C; SPIKE: B).")] = None,
+    sensor: Annotated[str | None, _port("sensor", "SensorValue. EV3: 1 to 4 (3); SPIKE: A to F (C).")] = None,
+    left_sensor: Annotated[str | None, _port("left-sensor", "LeftSensorValue (2; SPIKE: D).")] = None,
+    right_sensor: Annotated[str | None, _port("right-sensor", "RightSensorValue (4; SPIKE: E).")] = None,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Write a program as main.py for the brick.
@@ -51,9 +55,10 @@ def export(
 
       gecar export runs/evolve-001
       gecar export best.txt --target pybricks4 --out brick4
+      gecar export runs/spike-001 --target spike
       gecar export best.txt --robot my_robot.toml --left-motor -A --right-motor -D --sensor 1
     """
-    from gecar.brick.export import Ports, export_program
+    from gecar.brick.export import default_ports, export_program
     from gecar.cli.inputs import find_program
     from gecar.language.program import read_program
     from gecar.world.robot import load_robot
@@ -61,7 +66,11 @@ def export(
     output = Output(as_json)
     file, settings = find_program(program)
     loaded = read_program(file)
-    plugs = Ports(left_motor.upper(), right_motor.upper(), sensor, left_sensor, right_sensor)
+    given = {
+        "left_motor": left_motor, "right_motor": right_motor,
+        "sensor": sensor, "left_sensor": left_sensor, "right_sensor": right_sensor,
+    }  # fmt: skip
+    plugs = default_ports(target)(**{name: port.upper() for name, port in given.items() if port is not None})
     driver = load_robot(settings.get("robot", "ev3") if robot is None else robot)
     folder = out or Path("brick")
     written = _write(export_program(loaded, driver, target, plugs), folder, force)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,9 +111,9 @@ def facts(loaded: Robot) -> dict[str, Any]:
 
     fastest = sprint(loaded)
     regulated = loaded.drive.mode == "speed"
-    told = loaded.drive.duty_cap * FULL_SPEED * loaded.body.wheel_radius if regulated else math.inf
+    free = FULL_SPEED if regulated else loaded.battery.voltage / loaded.motor.back_emf_constant
     return {
-        "top_speed_m_s": min(fastest.limit, told),
+        "top_speed_m_s": min(fastest.limit, loaded.drive.duty_cap * free * loaded.body.wheel_radius),
         "time_constant_s": fastest.time_constant,
         "track_width_m": loaded.body.track_width,
         "sensor_ahead_m": loaded.colour_sensor.ahead,

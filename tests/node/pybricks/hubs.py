@@ -24,7 +24,15 @@ class _Screen:
         call("show", " ".join([str(word) for word in words]))
 
 
+class _Display:
+    def char(self, _letter):
+        call("clear")
+
+
 class _System:
+    def set_stop_button(self, _button):
+        pass
+
     def storage(self, offset, read=None, write=None):
         if write is not None:
             call("keep", offset, list(write))
@@ -38,4 +46,13 @@ class EV3Brick:
         self.battery = _Battery()
         self.speaker = _Speaker()
         self.screen = _Screen()
+        self.system = _System()
+
+
+class PrimeHub:
+    def __init__(self):
+        self.buttons = _Buttons()
+        self.battery = _Battery()
+        self.speaker = _Speaker()
+        self.display = _Display()
         self.system = _System()

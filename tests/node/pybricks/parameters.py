@@ -4,6 +4,7 @@ class Button:
     CENTER = "CENTER"
     UP = "UP"
     DOWN = "DOWN"
+    BLUETOOTH = "BLUETOOTH"
 
 
 class Port:
@@ -11,6 +12,8 @@ class Port:
     B = "B"
     C = "C"
     D = "D"
+    E = "E"
+    F = "F"
     S1 = "S1"
     S2 = "S2"
     S3 = "S3"

@@ -1,0 +1,3 @@
+from pybricks.ev3devices import ColorSensor, Motor
+
+__all__ = ["ColorSensor", "Motor"]
