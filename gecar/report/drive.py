@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from gecar.results.arrival import percent, with_share
+from gecar.search.robustness import Sweep
 from gecar.world.course.course import Course
 from gecar.world.course.lower_bound.fastest_time import bound_words
 from gecar.world.course.reference_times import reference_s
@@ -46,6 +47,33 @@ def _steps_of(times: Mapping[str, float | None]) -> str:
     if missed:
         return f"Simulated at a step of {', '.join(missed)} ms it does not arrive."
     return f"Simulated at steps of 4 to 0.25 ms it arrives in {min(arrived):.2f} to {max(arrived):.2f} s."
+
+
+def robustness_lines(sweeps: Sequence[Sweep]) -> list[str]:
+    """Say of each condition from where to where it may go until fewer drives arrive than `ENOUGH`."""
+    return [f"  {each.condition.title}: {_range_of(each)}" for each in sweeps]
+
+
+def _range_of(sweep: Sweep) -> str:
+    if sweep.range is None:
+        return "nowhere"
+    unit, levels = f" {sweep.condition.unit}".rstrip(), sweep.condition.levels
+    (low, high), ends = sweep.range, (levels[0], levels[-1])
+    edges = [word for word, at, end in (("lowest", low, ends[0]), ("highest", high, ends[1])) if at == end]
+    tried = f" (the {' and the '.join(edges)} tried)" if edges else ""
+    return f"{low:g} to {high:g}{unit}{tried}"
+
+
+def robustness_table(sweeps: Sequence[Sweep]) -> dict[str, Any]:
+    """Return shares of drives at GOAL by condition, ready for JSON."""
+    return {
+        each.condition.id: {
+            "levels": list(each.condition.levels),
+            "nominal": each.nominal,
+            "shares": each.shares.tolist(),
+        }
+        for each in sweeps
+    }
 
 
 def standing_of(world: World, drive: Drive) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -77,6 +77,11 @@ def simulate(
         typer.Option("--html", metavar="FILE", help="Write a page that plays the drive, for a classroom.",
                      show_default=False, rich_help_panel=PICTURES),
     ] = None,
+    robustness: Annotated[
+        Path | None,
+        typer.Option("--robustness", metavar="FILE", show_default=False, rich_help_panel=PICTURES,
+                     help="Draw the share of drives that arrive as start, battery, grip or noise go off nominal."),
+    ] = None,
     record: Annotated[
         Path | None,
         typer.Option("--record", metavar="FILE", show_default=False, rich_help_panel=PICTURES,
@@ -91,6 +96,7 @@ def simulate(
       gecar simulate runs/evolve-001
       gecar simulate best.txt --course hairpin --animate drive.gif
       gecar simulate best.txt --html drive.html
+      gecar simulate best.txt --robustness robustness.png
       gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
     """
     from gecar.cli.inputs import build_world, drive_seed, find_program
@@ -105,6 +111,8 @@ def simulate(
     file, settings = find_program(program)
     target = None if no_picture else _target(file, bool(settings), out, picture)
     _check_pictures(target, colour, animate, pace)
+    if robustness is not None:
+        _check_pictures(robustness, colour, None, pace)
     world = build_world(settings, course, robot, noise, motor_noise, time_limit, engine)
     loaded = read_program(file)
     which = drive_seed(seed, settings, loaded)
@@ -114,9 +122,10 @@ def simulate(
     output.print(arrival_of(arrival))
     output.print(standing_of(world, drive))
     title = title_of(drive, world.course, arrival["share"])
-    written = _draw(output, world, loaded, drive, target, title, colour)
+    written: dict[str, Any] = _draw(output, world, loaded, drive, target, title, colour)
     written |= _film(output, world, loaded, drive, animate, title, pace)
     written |= _play(output, world, loaded, drive, page, title)
+    written |= _robustness(output, world, loaded, robustness, which)
     written |= _record(output, world, loaded, drive, record, course)
     output.print_json(
         {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
@@ -188,6 +197,27 @@ def _play(
     write_classroom_page(world, program, drive, target, title, detail_of(world, drive))
     output.print(f"Page: {target}")
     return {"page": str(target)}
+
+
+def _robustness(
+    output: Output, world: World, program: Program, target: Path | None, seed: int
+) -> dict[str, Any]:
+    """Drive the program under conditions that go off nominal one by one if that is wanted; draw it and say it."""
+    if target is None:
+        return {}
+    from gecar.plots.drives.robustness import robustness_figure
+    from gecar.plots.style import save
+    from gecar.report.drive import robustness_lines, robustness_table
+    from gecar.search.robustness import DRAWS, ENOUGH, robustness
+
+    sweeps = robustness(world, program.opcodes, DRAWS, seed)
+    enough = f"at least {100 * ENOUGH:.0f} % of drives arrive"
+    course = world.course.title or world.course.name
+    detail = f"{course} · {DRAWS} drives a point, all else drawn · yellow: {enough}"
+    save(robustness_figure(sweeps, "How far off nominal the program still arrives", detail), target)
+    output.print("\n".join([f"{enough.capitalize()} with:", *robustness_lines(sweeps)]))
+    output.print(f"Picture: {target}")
+    return {"robustness": robustness_table(sweeps) | {"picture": str(target)}}
 
 
 def _record(
