@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 
@@ -12,6 +13,7 @@ REPORT = "Please report this with the command you typed; GECAR_DEBUG=1 shows whe
 
 def main() -> None:
     """Run the command line; exit code 0, 2 for a bad input, 130 for Ctrl-C, 1 for a fault of gecar's own."""
+    _print_anywhere()
     try:
         from gecar.cli.application import application  # noqa: PLC0415  an interrupt while importing is caught too
 
@@ -28,6 +30,13 @@ def main() -> None:
         if os.environ.get("GECAR_DEBUG"):
             raise
         _end(f"internal error: {type(error).__name__}: {error}\n{REPORT}", 1)
+
+
+def _print_anywhere() -> None:
+    """Let what a stream's encoding lacks, as → on Windows, come out as a question mark, and not as an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _end(words: str, code: int) -> None:

@@ -10,12 +10,12 @@ from pathlib import Path
 
 def command() -> str:
     """Return what to type for ``gecar``: that word where the shell would find it, else this one's path or module."""
-    beside = Path(sys.executable).with_name("gecar")
+    beside = shutil.which("gecar", path=str(Path(sys.executable).parent))  # on Windows it is gecar.exe
     found = shutil.which("gecar")
-    if found and Path(found).resolve() == beside.resolve():
+    if beside and found and Path(found).resolve() == Path(beside).resolve():
         return "gecar"
-    if beside.exists():
-        return _short(beside)
+    if beside:
+        return _short(Path(beside))
     return f"{_short(Path(sys.executable))} -m gecar"
 
 

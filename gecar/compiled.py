@@ -48,7 +48,9 @@ def _user_cache() -> Path:
     try:
         return Path.home() / ".cache"
     except RuntimeError:
-        own = Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"
+        if not hasattr(os, "getuid"):  # Windows, where the folder for temporary files is the user's own
+            return Path(tempfile.gettempdir())
+    own = Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"
     own.mkdir(mode=0o700, exist_ok=True)
     return own if own.stat().st_uid == os.getuid() else Path(tempfile.mkdtemp())
 
