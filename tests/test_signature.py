@@ -21,8 +21,15 @@ def test_the_size_that_is_shown_can_be_seen(effect):
     assert max(turned, moved, np.abs(with_it.reflection - without.reflection).max()) > 1.0
 
 
-def test_a_signature_is_whole():
-    assert is_whole(signature_figure("backlash", EV3, COURSE))
+@pytest.mark.parametrize(
+    ("effect", "place"),
+    [("backlash", []), ("slippery_patch", ["slippery"]), ("line_shift", ["the line's place"])],
+)
+def test_a_signature_is_whole_and_names_both_ways_and_the_place(effect, place):
+    figure = signature_figure(effect, EV3, COURSE)
+    assert is_whole(figure)
+    words = [text.get_text() for text in figure.axes[-1].get_legend().get_texts()]
+    assert words == ["without", "with it", *place]
 
 
 def test_show_draws_it_where_it_is_told_to(gecar, tmp_path):

@@ -9,9 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from shapely.affinity import rotate, translate
 
-from gecar.plots.courses.course import draw_course
-from gecar.plots.style import BLUE, ORANGE, SOFT, VERMILION, headline, look, new_figure
+from gecar.plots.courses.course import draw_course, outline_patch
+from gecar.plots.style import BLUE, INK, ORANGE, SKY, VERMILION, headline, look, new_figure
 from gecar.reality.fitting.parameters import free
 from gecar.reality.recordings.recording import make_recording
 from gecar.reality.recordings.setup import Setup
@@ -93,11 +95,15 @@ def signature_figure(effect_id: str, robot: Robot, course: Course) -> Figure:
     without, with_it = (_driven(r, course) for r in (robot, changed))
     sight = "sensor" in effect.channels
     figure = new_figure(10.0, 5.4)
+    figure.get_layout_engine().set(w_pad=0.1)
     with look():
         grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0))
         traces = [figure.add_subplot(grid[k, 0]) for k in range(3)]
         _draw_traces(traces, without, with_it, sight)
-        _draw_floor(figure.add_subplot(grid[:, 1]), course, without, with_it)
+        floor = figure.add_subplot(grid[:, 1])
+        _draw_floor(floor, course, without, with_it)
+        _draw_place(floor, course, changed)
+        floor.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
         sizes = ", ".join(f"{p.label} {values[p.label]:g}" for p in effect.parameters if p.label in values)
         headline(
             figure,
@@ -134,10 +140,10 @@ def _driven(robot: Robot, course: Course) -> _Drive:
 
 def _draw_traces(traces: list[Axes], without: _Drive, with_it: _Drive, sight: bool) -> None:
     top, middle, bottom = traces
-    for drive, colour, name in ((without, SOFT, "without"), (with_it, VERMILION, "with it")):
-        top.plot(drive.t, drive.rows[:, LEFT_SPEED], color=colour, linewidth=1.2, label=name)
+    for drive, colour, width, name in ((without, SKY, 3.5, "without"), (with_it, VERMILION, 1.2, "with it")):
+        top.plot(drive.t, drive.rows[:, LEFT_SPEED], color=colour, linewidth=width, label=name)
         if sight:
-            bottom.plot(drive.t, drive.reflection, color=colour, linewidth=1.2)
+            bottom.plot(drive.t, drive.reflection, color=colour, linewidth=width)
     change = with_it.rows - without.rows
     for column, colour, name in ((LEFT_ANGLE, BLUE, "left"), (RIGHT_ANGLE, ORANGE, "right")):
         middle.plot(without.t, np.degrees(change[:, column]), color=colour, linewidth=1.2, label=name)
@@ -159,12 +165,29 @@ def _draw_traces(traces: list[Axes], without: _Drive, with_it: _Drive, sight: bo
     bottom.set_xlabel("time [s]")
 
 
+def _draw_place(axes: Axes, course: Course, robot: Robot) -> None:
+    """Draw what an effect has on the floor: a slippery patch, or where the line lies."""
+    own = robot.physics[0]
+    if own["patch_radius"] > 0.0:
+        centre = float(own["patch_x"]), float(own["patch_y"])
+        patch = Circle(centre, float(own["patch_radius"]), color=VERMILION, alpha=0.2, linewidth=0)
+        axes.add_patch(patch)
+        patch.set_label("slippery")
+    if own["line_dx"] or own["line_dy"] or own["line_angle"]:
+        turned = rotate(course.line_area, float(own["line_angle"]), origin=(0, 0), use_radians=True)
+        moved = translate(turned, float(own["line_dx"]), float(own["line_dy"]))
+        line = outline_patch(moved, facecolor="none", edgecolor=VERMILION, linestyle="--", zorder=3.0)
+        axes.add_patch(line)
+        line.set_label("the line's place")
+
+
 def _draw_floor(axes: Axes, course: Course, without: _Drive, with_it: _Drive) -> None:
     draw_course(axes, course, marks=False)
-    for drive, colour in ((without, SOFT), (with_it, VERMILION)):
-        axes.plot(drive.rows[:, X], drive.rows[:, Y], color=colour, linewidth=1.4)
-        axes.plot(*drive.rows[-1, [X, Y]], "o", color=colour, markersize=5)
-    axes.plot(*START[:2], "o", color=BLUE, markersize=5)
+    # the wider one below stays in sight where both go the same way
+    for drive, colour, width, name in ((without, SKY, 4.5, "without"), (with_it, VERMILION, 1.3, "with it")):
+        axes.plot(drive.rows[:, X], drive.rows[:, Y], color=colour, linewidth=width, label=name)
+        axes.plot(*drive.rows[-1, [X, Y]], "o", color=colour, markersize=4.0 + width)
+    axes.plot(*START[:2], "s", color=INK, markersize=5)
     everywhere = np.vstack([without.rows[:, [X, Y]], with_it.rows[:, [X, Y]]])
     middle, half = (
         0.5 * (everywhere.min(axis=0) + everywhere.max(axis=0)),
