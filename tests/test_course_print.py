@@ -129,3 +129,8 @@ def test_unknown_papers_and_endless_pages_are_refused():
         plan_sheets(make_course(), "A0")
     with pytest.raises(InputError, match="PDF ends at 5 m"):
         plan_sheets(make_course("-" * 20, goal="[19, 0]", start="[0, 0]", heading='"right"'), "sheet")
+
+
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_the_classrooms_course_takes_a_dozen_sheets(paper):
+    assert len(plan_sheets(load_course("classroom"), paper).sheets) <= 12
