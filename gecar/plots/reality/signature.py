@@ -95,7 +95,7 @@ def signature_figure(effect_id: str, robot: Robot, course: Course) -> Figure:
     without, with_it = (_driven(r, course) for r in (robot, changed))
     sight = "sensor" in effect.channels
     figure = new_figure(10.0, 5.4)
-    figure.get_layout_engine().set(w_pad=0.1)
+    figure.set_layout_engine("constrained", w_pad=0.1)
     with look():
         grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0))
         traces = [figure.add_subplot(grid[k, 0]) for k in range(3)]
