@@ -55,6 +55,14 @@ def test_displacement_starts_at_nothing_and_lasts_as_long_as_both(found):
         assert each.correlation[0] > 0.9
 
 
+@pytest.mark.parametrize(("short_m", "arrived"), [(0.0004, True), (0.002, False)])
+def test_a_log_that_ends_as_goal_is_entered_may_be_a_rounding_short_of_it(short_m, arrived):
+    trace = simulate(World(ROBOT, COURSE, step_s=0.001), PROGRAM.opcodes, trace=True).trace
+    path = Path(*(trace[name].copy() for name in ("t_s", "x_m", "y_m", "heading_rad")))
+    path.y_m[-1] = 0.3 - short_m  # GOAL's lower edge is at 0.3 m
+    assert arrival_of(path, COURSE) == (path.t_s[-1], arrived, 18)
+
+
 def test_arrival_is_when_goal_is_entered_after_all_checkpoints():
     drive = simulate(World(ROBOT, COURSE), PROGRAM.opcodes, trace=True)
     path = Path(*(drive.trace[name] for name in ("t_s", "x_m", "y_m", "heading_rad")))

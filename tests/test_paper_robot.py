@@ -59,7 +59,7 @@ def test_paper_ev3_arrives_on_the_course_that_ships_too():
 def test_robots_that_ship_are_listed_and_shown(gecar):
     assert list_robots()[0] == "ev3"
     listed = gecar("robot", "list", "--json").json["robots"]
-    assert set(listed) == set(list_robots()) == {"ev3", "paper", "paper_ev3", "spike"}
+    assert set(listed) == set(list_robots()) == {"ev3", "paper", "paper_ev3", "spike", "worn_ev3"}
     assert listed["ev3"]["top_speed_m_s"] == pytest.approx(0.8 * 8.67 / 0.4731 * 0.028)
     shown = gecar("robot", "show", "paper", "--json")
     assert shown.json["constants"]["drive"]["mode"] == "speed"
@@ -67,5 +67,5 @@ def test_robots_that_ship_are_listed_and_shown(gecar):
 
 
 def test_an_unknown_robot_is_refused_with_those_there_are():
-    with pytest.raises(InputError, match=r"'paperr', expected a robot file .* ev3, paper, paper_ev3"):
+    with pytest.raises(InputError, match=r"'paperr', expected a robot file .* ev3, paper, paper_ev3, worn_ev3"):
         load_robot("paperr")

@@ -19,6 +19,7 @@ from gecar.files import json_ready, json_text, write_whole
 from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.parallel.run_parallel import Workplace, perform_each
+from gecar.reality.compare.side_by_side import Beside
 from gecar.reality.discovery import discover
 from gecar.reality.materiality import Material
 from gecar.reality.recordings.recording import Case
@@ -64,6 +65,13 @@ class Told(NamedTuple):
     files: dict[str, bytes]
 
 
+class Shown(NamedTuple):
+    """What report.html shows: recordings beside their simulations, and the HTML that stands below them."""
+
+    recordings: Sequence[Beside]
+    article: str
+
+
 def _keep_still(line: str) -> None:
     """Say nothing."""
 
@@ -81,14 +89,20 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
         catalogue=task.catalogue, material=task.material, program=task.program, language=task.language,
         invents=task.invents,
     )  # fmt: skip
-    out.mkdir(parents=True, exist_ok=True)
-    table = json_ready(verdict.as_json())
-    write_whole(out / "verdict.json", json_text(table))
-    write_robot(verdict.robot, out / "robot.toml")
+    table = write(verdict, out)
     if task.pictures:
         tell("pictures")
         draw(verdict, out)
     return Told(words(verdict), table, {})
+
+
+def write(verdict: Verdict, out: Path) -> dict[str, Any]:
+    """Write verdict.json and robot.toml into a folder; return what the first says."""
+    out.mkdir(parents=True, exist_ok=True)
+    table: dict[str, Any] = json_ready(verdict.as_json())
+    write_whole(out / "verdict.json", json_text(table))
+    write_robot(verdict.robot, out / "robot.toml")
+    return table
 
 
 def conclude_away(task: Task, tell: Callable[[str], None] = _keep_still) -> Told:
@@ -168,8 +182,8 @@ def _written(output: Output, out: Path, told: Told) -> dict[str, Any]:
     return told.table
 
 
-def draw(verdict: Verdict, out: Path) -> None:
-    """Write the pictures, the data behind them, and report.html."""
+def draw(verdict: Verdict, out: Path) -> Shown:
+    """Write the pictures, the data behind them, and report.html; return what was replayed for them."""
     from gecar.plots.reality.replay_page import replay_page
     from gecar.plots.reality.verdict import verdict_figures, verdict_tables
     from gecar.plots.style import save
@@ -192,3 +206,4 @@ def draw(verdict: Verdict, out: Path) -> None:
     write_whole(
         out / "report.html", replay_page(verdict, told.shown, first_screen(verdict, told.shown), below)
     )
+    return Shown(told.shown, below)

@@ -63,8 +63,7 @@ def run_to_the_end(output: Output, started: Started, pictures: bool, quiet: bool
     """
     if not quiet:
         _announce(output, started)
-    result = _finish(started, quiet)
-    mark_warm()
+    result = finish_watched(started, quiet)
     drawn = [str(path) for path in draw_run(started.folder.path)] if pictures else []
     _tell(output, started, result, drawn)
     world = started.task.world
@@ -86,17 +85,25 @@ def _announce(output: Output, started: Started) -> None:
     )
     if started.evolution.history:
         output.print(f"Going on after generation {started.evolution.generation}")
+    say_if_cold()
+
+
+def say_if_cold() -> None:
+    """Say that the simulation is compiled first, where it has not been."""
     if is_cold():
         print("Compiling the simulation; this once, it takes about 20 s ...", file=sys.stderr, flush=True)
 
 
-def _finish(started: Started, quiet: bool) -> dict[str, Any]:
+def finish_watched(started: Started, quiet: bool) -> dict[str, Any]:
+    """Run to the end with progress on stderr; return what result.json says."""
     evolution = started.evolution
     try:
         with Watch(evolution.history, evolution.settings.generations, quiet) as watch:
-            return finish(started, watch)
+            result = finish(started, watch)
     except KeyboardInterrupt:  # how to go on has been said
         raise typer.Exit(130) from None
+    mark_warm()
+    return result
 
 
 def _tell(output: Output, started: Started, result: dict[str, Any], pictures: list[str]) -> None:

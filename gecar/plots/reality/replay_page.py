@@ -38,7 +38,7 @@ _TITLES = {
 }  # fmt: skip
 
 
-def replay_page(verdict: Verdict, shown: Sequence[Beside], head: str, article: str) -> str:
+def replay_page(verdict: Verdict, shown: Sequence[Beside], head: str, article: str, title: str = "") -> str:
     """Return the page.
 
     Parameters
@@ -49,10 +49,12 @@ def replay_page(verdict: Verdict, shown: Sequence[Beside], head: str, article: s
         Recordings beside their simulations.
     head, article
         HTML: what stands above, and below.
+    title
+        Of the page.
     """
     played = replays_json(verdict, shown)
     words = {
-        "@TITLE@": html.escape(f"{verdict.case}: what the simulation lacks"),
+        "@TITLE@": html.escape(title or f"{verdict.case}: what the simulation lacks"),
         "@HEAD@": head,
         "@ARTICLE@": article,
         "@PLAYED@": script_json(played),

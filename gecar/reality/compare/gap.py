@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from shapely.geometry import Point
 
 from gecar.language.program import Program
 from gecar.reality.recordings.columns import COLUMNS
@@ -28,6 +29,7 @@ from gecar.world.rollout import Outcome, World, simulate
 
 Array = npt.NDArray[np.float64]
 
+AT_EDGE_M = 0.001  # a pose this near GOAL, at a log's end, is in it: no camera knows better
 STEP_S = 0.01  # of displacements, as in the paper's Fig. 10
 _QUIET_PCT = 0.5  # noise assumed in a replayed reading: only clipping at 0 and 100 feels it
 CHANNELS = {f: c for c, (f, _) in COLUMNS.items() if f not in ("t_s", "left_duty", "right_duty")}
@@ -225,11 +227,13 @@ def _reckoned(recording: Recording, robot: Robot, course: Course | None) -> Path
 def arrival_of(path: Path, course: Course | None) -> tuple[float, bool, int]:
     """Return (time, whether GOAL was reached through all checkpoints in order, checkpoints passed).
 
-    The time is GOAL's, or the path's last where that was not reached [s].
+    The time is GOAL's, or the path's last where that was not reached [s]. The last pose of a log that ends as GOAL is
+    entered may be rounded to just outside.
     """
+    end = float(path.t_s[-1])
     if course is None:
-        return float(path.t_s[-1]), False, 0
-    t = np.arange(0.0, path.t_s[-1] + 1e-9, 0.002)  # as fine as the simulation's own steps
+        return end, False, 0
+    t = np.append(np.arange(0.0, end, 0.002), end)  # as fine as the simulation's own steps
     at = np.floor(path.at(t) / course.tile_size_m).astype(int)
     inside = (at >= 0).all(axis=1) & (at[:, 0] < course.columns) & (at[:, 1] < course.rows)
     tiles = np.where(inside, at[:, 1] * course.columns + at[:, 0], -1)
@@ -239,7 +243,10 @@ def arrival_of(path: Path, course: Course | None) -> tuple[float, bool, int]:
             passed += 1
             if passed == len(course.sequence):
                 return float(t[k]), True, passed - 1
-    return float(path.t_s[-1]), False, passed
+    if passed == len(course.sequence) - 1:
+        last = Point(path.x_m[-1], path.y_m[-1])
+        return end, bool(course.layout.square(course.goal).distance(last) < AT_EDGE_M), passed
+    return end, False, passed
 
 
 def _against_drive(
