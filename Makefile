@@ -12,7 +12,7 @@ PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 py
 	$(if $(shell $(name) -c '$(NEW_ENOUGH)' 2>/dev/null),$(name))))
 
 .DEFAULT_GOAL := help
-.PHONY: help env evolve test check format bench concealed fuzz clean
+.PHONY: help env evolve test check format docs bench concealed fuzz clean
 
 help:  ## Show this list
 	@echo "gecar: evolve programs for a line-following robot. Try: make evolve"
@@ -37,6 +37,9 @@ check: $(VENV)/.check  ## Check format, style, types and which room imports whic
 format: $(VENV)/.check  ## Put the sources in the format that check wants
 	$(VENV)/bin/ruff format
 	$(VENV)/bin/ruff check --fix
+
+docs: $(VENV)/.docs  ## Build the documentation into build/docs, with a reference from docstrings; checks links
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build $(ARGS)
 
 bench: $(VENV)/.cluster  ## Measure how fast gecar is, and print it as a table
 	$(PY) -m benchmarks $(ARGS)
@@ -63,7 +66,7 @@ $(VENV)/.runtime: pyproject.toml | $(PY)
 	@$(PIP) install --quiet --editable .
 	@touch $@
 
-$(VENV)/.test $(VENV)/.check $(VENV)/.cluster $(VENV)/.fuzz: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
+$(VENV)/.test $(VENV)/.check $(VENV)/.docs $(VENV)/.cluster $(VENV)/.fuzz: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
 	@$(PIP) install --quiet --editable '.[$*]'
 	@touch $@
