@@ -8,7 +8,7 @@ from trials import ARRIVES, trial, weak_robot, write_trials
 
 from gecar.language.program import parse_program
 from gecar.plots.reality.bench import bench_figure
-from gecar.plots.reality.gap import gap_figure
+from gecar.plots.reality.gap import gap_figure, short_names
 from gecar.plots.style import is_whole
 from gecar.reality.compare.bench import bench_gap
 from gecar.reality.compare.gap import Path, arrival_of, gap, nrmse, recorded_path
@@ -110,6 +110,26 @@ def test_tables_hold_every_trial_and_their_spread(found):
     assert float(rows[2]["arrival_s"]) == pytest.approx(np.mean(times), rel=1e-5)
     assert spread(found)["arrival_s"]["max"] == max(times)
     assert "| x_m |" in gap_markdown(found)
+
+
+@pytest.mark.parametrize("count", [1, 7, 30])
+def test_a_picture_holds_any_number_of_trials_with_names_as_people_give_them(found, count):
+    names = [f"2026-11-22_14-{k:02d}_group-3_line_following_take_{k}" for k in range(count)]
+    trials = tuple(replace(found.trials[k % 2], name=name) for k, name in enumerate(names))
+    assert is_whole(gap_figure(replace(found, trials=trials), "title", "detail"))
+
+
+@pytest.mark.parametrize(
+    ("names", "short"),
+    [
+        (["trial_1", "trial_2"], ["trial_1", "trial_2"]),
+        (["monday_afternoon_run_1", "monday_afternoon_run_2"], ["1", "2"]),
+        (["monday_afternoon_with_line"], ["…oon_with_line"]),
+        (["a_very_long_shared_ending", "b_very_long_shared_ending"], ["1", "2"]),
+    ],
+)
+def test_long_names_are_shortened_to_what_tells_them_apart(names, short):
+    assert short_names(names) == short
 
 
 def test_a_picture_of_trials_is_whole(found):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle, islice
+from itertools import cycle, islice, takewhile
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,9 @@ TRIAL_COLOURS = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)
 DASHES = ((0, (4, 1.6)), (0, (1.4, 1.2)), (0, (6, 1.4, 1.4, 1.4)), (0, (3, 1)))
 WIDTH_IN = 11.0
 MAP_IN = 7.4
+LONGEST_NAME = 14  # characters
+MOST_NAMED = 12  # recordings in a legend
+ROW_IN = 0.22  # of an arrival time
 
 
 def gap_figure(found: Gap, title: str = "", detail: str = "") -> Figure:
@@ -50,9 +53,10 @@ def gap_figure(found: Gap, title: str = "", detail: str = "") -> Figure:
     course = found.course
     height = min(max(MAP_IN * (course.height_m / course.width_m if course else 0.6), 2.8), 6.5)
     with look():
-        figure = new_figure(WIDTH_IN, height + 3.7)
+        below = max(2.6, ROW_IN * len(found.trials))
+        figure = new_figure(WIDTH_IN, height + below + 1.1)
         headline(figure, title, detail)
-        grid = figure.add_gridspec(2, 12, height_ratios=(height, 2.6))
+        grid = figure.add_gridspec(2, 12, height_ratios=(height, below))
         _paths(figure.add_subplot(grid[0, :9]), found)
         _misfits(figure.add_subplot(grid[0, 9:]), found.trials)
         _displacements(figure.add_subplot(grid[1, :8]), found)
@@ -69,14 +73,28 @@ def _styles(trials: Sequence[Trial]) -> list[dict[str, Any]]:
     ]
 
 
+def short_names(names: Sequence[str]) -> list[str]:
+    """Shorten names of recordings to the words that tell them apart, or to their ends; numbers where that fails."""
+    if max(map(len, names)) <= LONGEST_NAME:
+        return list(names)
+    words = [name.split("_") for name in names]
+    shared = sum(1 for _ in takewhile(lambda each: len(set(each)) == 1, zip(*words, strict=False)))
+    apart = ["_".join(each[shared if len(names) > 1 else 0 :]) for each in words]
+    short = [name if len(name) <= LONGEST_NAME else f"…{name[1 - LONGEST_NAME :]}" for name in apart]
+    return short if len(set(short)) == len(short) else [f"{k}" for k in range(1, len(names) + 1)]
+
+
 def _paths(axes: Axes, found: Gap) -> None:
     """Draw the ways over the course, as in the paper's Fig. 9: simulation solid, recordings broken."""
     _floor(axes, found)
-    whole = slice(None)
-    for trial, style in zip(found.trials, _styles(found.trials), strict=True):
+    whole, many = slice(None), len(found.trials) > MOST_NAMED
+    names = short_names([trial.name for trial in found.trials])
+    if many:
+        names = [f"{len(names)} recordings", *("_nolegend_" for _ in names[1:])]
+    for trial, style, name in zip(found.trials, _styles(found.trials), names, strict=True):
         end = np.searchsorted(trial.path.t_s, trial.arrival_s, side="right")
         until = slice(None, max(int(end), 2))
-        _way(axes, trial.path, until, linewidth=1.5, zorder=4, label=trial.name, **style)
+        _way(axes, trial.path, until, linewidth=1.5, zorder=4, label=name, **style)
         if found.simulated_s is None:
             thin = {"linewidth": 1.2, "zorder": 3.9, "alpha": 0.6}
             _way(axes, trial.simulated, whole, color=style["color"], **thin)
@@ -84,7 +102,7 @@ def _paths(axes: Axes, found: Gap) -> None:
         bold = {"linewidth": 2.0, "zorder": 5, "label": "simulation"}
         _way(axes, found.trials[0].simulated, whole, color=INK, **bold)
     axes.legend(
-        loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=min(6, len(found.trials) + 1), handlelength=2.6
+        loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=min(5, len(found.trials) + 1), handlelength=2.6
     )
 
 
@@ -124,7 +142,7 @@ def _displacements(axes: Axes, found: Gap) -> None:
 def _times(axes: Axes, found: Gap) -> None:
     """Draw arrival times and the simulation's, Table 6 as a picture."""
     axes.set_title("Arrival time [s]")
-    names = [trial.name for trial in found.trials]
+    names = short_names([trial.name for trial in found.trials])
     for row, (trial, style) in enumerate(zip(found.trials, _styles(found.trials), strict=True)):
         face = str(style["color"]) if trial.arrived else PAPER
         axes.plot(trial.arrival_s, row, "o", color=style["color"], markerfacecolor=face, markersize=6)
@@ -135,7 +153,7 @@ def _times(axes: Axes, found: Gap) -> None:
             if trial.arrived
             else "  ended"
         )
-        axes.annotate(words, (trial.arrival_s, row), (0, 6), textcoords="offset points", size=7, ha="center")
+        axes.annotate(words, (trial.arrival_s, row), (6, 0), textcoords="offset points", size=7, va="center")
     if found.simulated_s is not None:
         arrived = found.outcome == Outcome.GOAL
         words = f"line: simulation {with_share(found.simulated_s, found.share)}"
@@ -144,7 +162,7 @@ def _times(axes: Axes, found: Gap) -> None:
         axes.set_xlabel(words, size=7.5, loc="right")
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.7)
-    axes.margins(x=0.3)
+    axes.margins(x=0.5)
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
 
