@@ -10,12 +10,12 @@ import numpy as np
 
 from gecar.language.program import Program
 from gecar.reality.compare.gap import Gap
-from gecar.reality.compare.side_by_side import Beside
+from gecar.reality.compare.side_by_side import PLACE, Beside
 from gecar.reality.verdict import Interval, Verdict
 from gecar.report.gap import gap_lines, mean_and_spread
 from gecar.report.units import quantities
 from gecar.report.verdict import sizes_of
-from gecar.report.verdict_page import picture_html, the_number
+from gecar.report.verdict_page import picture_html
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 from gecar.world.rollout import Outcome
@@ -102,13 +102,13 @@ def _size(effect: str, truth: Robot) -> str:
     return "; ".join(f"{q.what} {q.now:.4g} {q.unit}".rstrip() for q in quantities(effect, exact, truth))
 
 
-def demo_head(first: Round, second: Round, verdict: Verdict, shown: Sequence[Beside]) -> str:
+def demo_head(first: Round, second: Round, shown: Sequence[Beside]) -> str:
     """Return, as HTML, what stands above the drive that the page plays."""
     return _HEAD.format(
         first=_text(predicted_and_driven(first)),
         second=_text(predicted_and_driven(second)),
         honest=_text(HONEST),
-        number=the_number(verdict, shown),
+        number=_apart(shown),
     )
 
 
@@ -150,6 +150,18 @@ def demo_article(
         second=_text(" ".join(gap_lines(second.gap)[:2])),
         gap_again=picture_html("Prediction and drives", gap_again, compared),
         commands=_text("\n".join(commands)),
+    )
+
+
+def _apart(shown: Sequence[Beside]) -> str:
+    """Say how far replays keep from the drives set aside: on average, for a loop ends where it began."""
+    drives = [each.apart(PLACE) for each in shown if each.set_aside and each.has(PLACE)]
+    if not drives:
+        return ""
+    before, after = (np.mean([np.nanmean(drive[k]) for drive in drives]) for k in (1, 2))
+    return (
+        f"Its commands replayed, the simulation is off by <span class='was'><strong>{before:.0f} mm</strong></span> on "
+        f"average; with what was found, by <span class='now'><strong>{after:.0f} mm</strong></span>."
     )
 
 

@@ -152,7 +152,7 @@ class Demo:
         ]
         pictures = [path.read_bytes() for path in (self.out / "first" / "trajectory.png", *gaps)]
         told = demo_article(first, second, faults, shown.article, pictures, self._commands("gecar"))
-        head = demo_head(first, second, verdict, shown.recordings)
+        head = demo_head(first, second, shown.recordings)
         page = self.out / "demo.html"
         write_whole(page, replay_page(verdict, shown.recordings, head, told, "gecar demo"))
         return page
