@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -96,6 +97,44 @@ def test_a_hidden_law_is_written_anew_and_closes_the_gap(hidden):
         law.alternatives for law in verdict.invented
     )
     assert not set(verdict.fitted_on) & set(verdict.judgement.recordings)
+
+
+HIDDEN_FROM_DERIVATIVES = parse_grammar(
+    """
+    <term> ::= tyre_grip: c * <f> | wheel_load: c * <f> | command: c * <lost> | motor_torque: c * speed
+    <f> ::= 1 | x | sin(10 * y)
+    <lost> ::= command * positive(<low> - abs(command)) | sign(command) * min(abs(command), <low>) | command
+    <low> ::= 0.15 | 0.25
+    """
+)
+GRIP = frozen(port="tyre_grip", law="c1", c1=-0.75)
+THRESHOLD = frozen(port="command", law="-command * positive(k1 - abs(command))", k1=0.25)
+
+
+@pytest.mark.parametrize(("hidden", "size"), [(GRIP, -0.75), (THRESHOLD, -1.0)], ids=["grip", "threshold"])
+def test_what_has_no_derivative_at_none_is_found_by_finite_probes(hidden, size):
+    verdict = verdict_on(hidden, language=HIDDEN_FROM_DERIVATIVES)
+    (law,) = verdict.invented
+    assert law.term.port == dict(hidden)["port"]
+    assert law.parameters["c1"].value == pytest.approx(size, rel=0.05)
+    assert set(law.parameters) == set(law.term.constants)
+    assert law.spread < 0.1
+
+
+def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
+    language = parse_grammar(
+        "<t> ::= motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
+    )
+    (law,) = verdict_on(DRAG, language=language).invented
+    assert law.term.law == "c1 * speed * abs(speed)"
+
+
+def test_without_a_camera_no_law_speaks_of_places():
+    runs = [recorded(robot_with(*map(dict, TILT)), seed) for seed in range(4)]
+    blind = tuple(replace(r, **{f: np.full(len(r.t_s), np.nan) for f in ("x_m", "y_m", "heading_rad")}) for r in runs)
+    verdict = discover(Case("blind", blind), catalogue=UNRELATED, language=FEW, invents=True)
+    assert not {law.term.port for law in verdict.invented} & {"force_x", "force_y", "force_toward"}
+    assert not {name for law in verdict.invented for name in law.term.parsed.variables} & {"x", "y", "heading"}
 
 
 def test_the_robot_found_carries_the_law(tmp_path):

@@ -47,7 +47,7 @@ def with_formulas(formulas: Sequence[Formula]) -> Correction:
         moved[:, Y] += _added_up(now[1] - was[1], replayer.t)
         shift = moved[:, [X, Y, HEADING]] - rows[:, [X, Y, HEADING]]
         moves = [np.interp(replayer.inputs.pose_t, replayer.t, column) for column in shift.T]
-        return moved, _aligned(poses + np.stack(moves, axis=1), replayer.inputs.pose, replayer.inputs.sd[3:5])
+        return moved, aligned(poses + np.stack(moves, axis=1), replayer.inputs.pose, replayer.inputs.sd[3:5])
 
     return change
 
@@ -72,7 +72,7 @@ def _floor_velocity(ahead: Array, aside: Array, heading: Array) -> tuple[Array, 
     return ahead * cos - aside * sin, ahead * sin + aside * cos
 
 
-def _aligned(poses: Array, measured: Array, sd: Array) -> Array:
+def aligned(poses: Array, measured: Array, sd: Array) -> Array:
     """Turn and shift a path onto the poses seen: its start is a nuisance, as in every replay that is judged."""
     seen = ~np.isnan(measured).any(axis=1)
     if seen.sum() < FEWEST_POSES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +20,7 @@ INNER_STEP = 0.1  # of an inner constant's size: one coordinate
 POINT_STEP_M = 0.05
 FARTHEST = 20.0  # coordinates of an inner constant: from a sixth of its size to six times
 PROBE = 0.1  # step of finite differences, in coordinates
+_STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
 _USUAL = {variable.id: variable.scale for variable in VARIABLES}
 
 
@@ -111,9 +113,12 @@ def usual_size(term: Term) -> float:
 
 
 def _constants(k: int, term: Term) -> list[Constant]:
+    """Return a term's constants but those that say where a step stands: residuals have no derivative by them."""
     free, of_law = [], linear(term)
     for number, name in enumerate(term.free):
         value = term.constants[name]
+        if not re.search(rf"\b{name}\b", _STEP.sub("", term.law)):
+            continue
         if name in of_law:
             size = max(abs(value) * INNER_STEP, usual_size(term))
             free.append(Constant(k, name, CONSTANTS + number, value, size, False))

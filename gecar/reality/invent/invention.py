@@ -22,7 +22,7 @@ from gecar.reality.fitting.model import Effects, Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
-from gecar.reality.invent.proof import Proof, largest_gains, left_out_gains
+from gecar.reality.invent.proof import Proof, largest_gains, left_out_gains, simplified
 from gecar.reality.invent.search import Law, Library, search
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
@@ -31,7 +31,7 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE
+from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE, UNSTEADY
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
 from gecar.world.ports import N_TERMS, PORTS
@@ -43,6 +43,8 @@ MOST_LAWS = 3
 TRIED = 3  # of the best laws, until one is proved
 HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
 ROUNDS = 6
+OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
+ON_FLOOR = frozenset(("force_x", "force_y", "force_toward"))  # ports that have the floor's axes
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,8 @@ def invent(
         if len(here.problem.estimator.robot.term) == N_TERMS:
             break
         library = Library(here.problem, here.taken)
-        found = search(library, grammar, ports, seed + number, tell)
+        unknown = frozenset() if _placed(problem) else OF_PLACE
+        found = search(library, grammar, ports, seed + number, tell, unknown)
         proved = _first_proved(library, found, largest_gains(library, seed))
         if proved is None:
             break
@@ -120,15 +123,28 @@ def _ports(problem: Problem) -> list[str]:
         sensors |= {"camera"} if any(run.replayer.has_poses for run in runs) else set()
         sensors |= {"encoders"} if any(0 in seen or 1 in seen for seen in measured) else set()
         sensors |= {"gyro"} if any(3 in seen for seen in measured) else set()
-    return [port.id for port in PORTS if port.sensor in sensors and (port.on_bench or not problem.on_bench)]
+    there = [port for port in PORTS if port.sensor in sensors and (port.on_bench or not problem.on_bench)]
+    return [port.id for port in there if _placed(problem) or port.id not in ON_FLOOR]
+
+
+def _placed(problem: Problem) -> bool:
+    """Whether it is known where the robot stood: if not, no recording's axes are another's."""
+    runs = problem.residuals.recordings
+    return any(run.replayer.has_poses or run.nuisances.start is not None for run in runs)
 
 
 def _first_proved(library: Library, found: Sequence[Law], nulls: Array) -> tuple[Law, Proof] | None:
     """Return the best law that left-out recordings ask for, with its proof; None where the best few are all chance."""
-    for law in found[:TRIED]:
-        if law.worth >= PRICE and (proof := Proof(left_out_gains(library, law), nulls)).holds:
+    for law in (simplified(library, each) for each in found[:TRIED] if each.worth >= PRICE):
+        proof = Proof(left_out_gains(library, law), nulls)
+        if law.worth >= PRICE and proof.holds and _spread(library, law) < UNSTEADY:
             return law, proof
     return None
+
+
+def _spread(library: Library, law: Law) -> float:
+    """Return the relative spread over recordings of a law's size: a cause has one size, what imitates one has many."""
+    return spread_of_size(library.problem.estimator.blocks.folds, library.model.errors, law.minimum.errors)
 
 
 def _added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
@@ -242,6 +258,9 @@ def _with_constants_of(written: Written, first: Explanation) -> tuple[Invented, 
     for c, reach in zip(together.constants, half.tolist(), strict=True):
         ends = sorted(float(c.at(side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
         intervals[c.term][c.name] = Interval(c.value, ends[0], ends[1], "")
+    for term, known in zip(written.terms, intervals, strict=True):
+        fixed = {name: value for name, value in term.constants.items() if name not in known}
+        known |= {name: Interval(value, value, value, "") for name, value in fixed.items()}
     told = zip(written.invented, written.terms, intervals, strict=True)
     return tuple(replace(law, term=term, parameters=found) for law, term, found in told)
 
@@ -261,7 +280,7 @@ def _told(
             left_out_gain=proof.gain,
             null_95=proof.null_95,
             p=proof.p,
-            spread=spread_of_size(problem.estimator.blocks.folds, library.model.errors, law.minimum.errors),
+            spread=_spread(library, law),
             range=ranges(term, problem.residuals.recordings, physics),
             size=problem.sizes.apart(physics, library.model.physics),
         )

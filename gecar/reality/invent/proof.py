@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.invent.search import Law, Library
+from gecar.reality.invent.search import Law, Library, fit
+from gecar.reality.invent.sentences import shortened
 from gecar.reality.optimisation.least_squares import costs, jacobian, left_out_costs
-from gecar.reality.selection.thresholds import SIGNIFICANCE
+from gecar.reality.selection.thresholds import PRICE, SIGNIFICANCE
 
 Array = npt.NDArray[np.float64]
 
@@ -59,6 +60,20 @@ def left_out_gains(library: Library, law: Law) -> Array:
     after = left_out_costs(law.minimum, slopes, free.bounds, residual, blocks.folds)
     out: Array = (np.bincount(blocks.folds, costs(library.model.errors)) - after)[folds]
     return out
+
+
+def simplified(library: Library, law: Law) -> Law:
+    """Return a law without the parts that left-out recordings do not ask for beside the others."""
+    while True:
+        shorter = [fit(library, rest) for rest in shortened(law.terms)]
+        if not shorter:
+            return law
+        gains = left_out_gains(library, law)
+        asked = [gains - left_out_gains(library, rest) for rest in shorter]
+        least = min(range(len(asked)), key=lambda k: asked[k].sum())
+        if asked[least].sum() >= PRICE and np.mean(asked[least] > 0.0) > 0.5:
+            return law
+        law = shorter[least]
 
 
 def largest_gains(library: Library, seed: int) -> Array:

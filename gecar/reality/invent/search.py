@@ -46,6 +46,8 @@ Column = npt.NDArray[np.float32]
 
 TOGETHER = 64  # laws whose residuals are held at a time
 SMALL_RESPONSE, LARGE_RESPONSE = 0.02, 1.0  # standard deviations: a derivative is taken between
+UNEVEN = 2.0  # times as much or as little a size as before: then a derivative at none says nothing
+FINITE = (-160.0, -80.0, -40.0, -20.0, 20.0, 40.0, 80.0, 160.0)  # sizes that are tried then, in `usual_size`s
 KEPT_COLUMNS = 400
 KEPT_LAWS = 40  # of those tried one by one, and of those evolved
 PORTS_KEPT = 0.3  # of the best law's gain: what a port's best law must gain for evolution to look there
@@ -146,17 +148,23 @@ class Library:
                 self._keep(name, column)
 
     def _keep(self, name: str, column: Array) -> None:
+        projected = self._scored(name, column)[0]
+        while len(self._columns) >= KEPT_COLUMNS:
+            self._columns.pop(next(iter(self._columns)))
+        self._columns[name] = projected.astype(np.float32)
+
+    def _scored(self, name: str, column: Array) -> tuple[Array, float]:
+        """Return what is a sensitivity's own, weighted, and the size the residuals ask for; its score is kept."""
         weighted = column * self._root
         projected = self._projected(weighted)
         left = float(projected @ projected)
         if left <= OWN_SHARE * float(weighted @ weighted):
             projected, left = np.zeros(len(column)), 1.0
-        self._gains[name] = 0.5 * float(self._target @ projected) ** 2 / left
+        pull = float(self._target @ projected)
+        self._gains[name] = 0.5 * pull**2 / left
         spans = np.bincount(self.problem.estimator.blocks.spans, projected * self._target / np.sqrt(left))
         self.scores[name] = spans.astype(np.float32)
-        while len(self._columns) >= KEPT_COLUMNS:
-            self._columns.pop(next(iter(self._columns)))
-        self._columns[name] = projected.astype(np.float32)
+        return projected, -pull / left
 
     def _projected(self, weighted: Array) -> Array:
         """Return what the model's own parameters leave of a weighted column."""
@@ -164,15 +172,39 @@ class Library:
         return out
 
     def _sensitivities(self, parts: Sequence[Term]) -> list[Array]:
-        """Return the whitened residuals' derivatives by laws' constants, in units of `usual_size`, each shape (n,)."""
+        """Return the whitened residuals' derivatives by laws' constants, in units of `usual_size`, each shape (n,).
+
+        Where the derivative at none says nothing (tyres that do not slip), the change by the finite size that the
+        residuals ask for most, over that size.
+        """
         sizes = np.ones(len(parts))
         changes = self._changes(parts, sizes)
         rms = np.sqrt(np.mean(np.square(changes), axis=1))
-        again = np.flatnonzero((rms > LARGE_RESPONSE) | ((rms < SMALL_RESPONSE) & (rms > 1e-9))).tolist()
-        if again:
-            sizes[again] = np.clip(0.3 / rms[again], 1e-4, 100.0)
+        again = np.flatnonzero((rms > LARGE_RESPONSE) | (rms < SMALL_RESPONSE))
+        if len(again):
+            sizes[again] = np.clip(0.3 / np.maximum(rms[again], 1e-9), 1e-4, 100.0)
             changes[again] = self._changes([parts[k] for k in again], sizes[again])
-        return [change / size for change, size in zip(changes, sizes, strict=True)]
+        slopes = changes / sizes[:, None]
+        steeper = np.sqrt(np.mean(np.square(slopes), axis=1)) / np.maximum(rms, 1e-9)
+        uneven = (rms < SMALL_RESPONSE) & ((steeper > UNEVEN) | (steeper < 1.0 / UNEVEN))
+        for k in np.flatnonzero(uneven).tolist():
+            slopes[k] = self._secant(parts[k], slopes[k])
+        return list(slopes)
+
+    def _secant(self, part: Term, slope: Array) -> Array:
+        """Return a law's change by a finite size over that size: of those that are asked for, the one that gains most.
+
+        Every one of them is a try, and counts for the null distribution.
+        """
+        name, sizes = key((part,)), np.array(FINITE)
+        secants = self._changes([part] * len(sizes), sizes) / sizes[:, None]
+        best, most = slope, 0.0
+        for size, secant in zip(sizes.tolist(), secants, strict=True):
+            tried = f"{name} about {size:g}"
+            asked = self._scored(tried, secant)[1]
+            if asked * size > 0.0 and self._gains[tried] > most:
+                best, most = secant, self._gains[tried]
+        return best
 
     def _changes(self, parts: Sequence[Term], sizes: Array) -> Array:
         records = []
@@ -198,6 +230,7 @@ def search(
     ports: Sequence[str],
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+    unknown: frozenset[str] = frozenset(),
 ) -> list[Law]:
     """Return the laws worth most, fitted in full, best first.
 
@@ -213,10 +246,14 @@ def search(
         Random seed.
     tell
         Called with a line of progress.
+    unknown
+        Variables that laws may not look at.
     """
     room = N_TERMS - len(library.problem.estimator.robot.term)
     there = at_ports(grammar, ports, room)
-    singles = single_laws(there)
+    singles = [laws for laws in single_laws(there) if not _variables(laws) & unknown]
+    if not singles:
+        return []
     tell(f"{len(singles)} laws one by one")
     for first in range(0, len(singles), TOGETHER):
         some = singles[first : first + TOGETHER]
@@ -227,7 +264,7 @@ def search(
     promising = {t.port for laws in singles for t in laws if library.gain(laws) >= PORTS_KEPT * best}
     kept = sorted(singles, key=lambda laws: _loss(library, laws))[:KEPT_LAWS]
     tell(f"laws evolved at {', '.join(port for port in ports if port in promising)}")
-    evolved = _evolved(library, at_ports(there, sorted(promising)), seed)
+    evolved = _evolved(library, at_ports(there, sorted(promising)), seed, unknown)
     candidates = {key(laws): laws for laws in (*_greedy_sums(library, kept), *evolved, *kept)}
     ranked = sorted(candidates.values(), key=lambda laws: _loss(library, laws))
     fitted = [fit(library, library.started(laws)) for laws in _spread_over_ports(ranked)]
@@ -286,24 +323,32 @@ def _sum(parts: Sequence[Term]) -> Term | None:
         return None
 
 
+def _variables(laws: Laws) -> set[str]:
+    return {name for term in laws for name in term.parsed.variables}
+
+
 class _Evolved(EvolvedProblem[Laws]):
-    """Laws as what an evolution evolves: the sentences of a grammar."""
+    """Laws as what an evolution evolves: the sentences of a grammar, less those of unknown variables."""
+
+    def __init__(self, unknown: frozenset[str]) -> None:
+        self._unknown = unknown
 
     def read(self, derivation: Derivation) -> Laws | None:
         """Return the laws that were derived; None where the sentence is none."""
         try:
-            return read_sentence(derivation.text)
+            laws = read_sentence(derivation.text)
         except ValueError:
             return None
+        return None if _variables(laws) & self._unknown else laws
 
     def meaning(self, program: Laws, derivation: Derivation) -> bytes:  # noqa: ARG002
         """Return the laws as bytes."""
         return key(program).encode()
 
 
-def _evolved(library: Library, grammar: Grammar, seed: int) -> list[Laws]:
+def _evolved(library: Library, grammar: Grammar, seed: int, unknown: frozenset[str]) -> list[Laws]:
     """Return the best laws of an evolution."""
-    evolution = Evolution(Mapper(grammar), _Evolved(), EVOLUTION, seed)
+    evolution = Evolution(Mapper(grammar), _Evolved(unknown), EVOLUTION, seed)
     found: dict[str, tuple[float, Laws]] = {}
     while not evolution.finished:
         asked = [candidate.program for candidate in evolution.ask()]

@@ -92,6 +92,18 @@ def parts_of(laws: Laws) -> list[Term]:
     return [part for term in laws for part in pieces(term)]
 
 
+def shortened(laws: Laws) -> list[Laws]:
+    """Return laws without one of their parts, each in turn; none of a law of one part."""
+    of_each = [pieces(term) for term in laws]
+    out = []
+    for k, parts in enumerate(of_each):
+        for part in range(len(parts)):
+            rest = [*parts[:part], *parts[part + 1 :]]
+            left = [joined(some) for some in (*of_each[:k], rest, *of_each[k + 1 :]) if some]
+            out += [tuple(left)] if left else []
+    return out
+
+
 def joined(parts: Sequence[Term]) -> Term:
     """Return parts of one port, side and store as one sum, their constants numbered anew."""
     laws, constants = [], dict[str, float]()
