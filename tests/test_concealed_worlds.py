@@ -178,6 +178,19 @@ def test_plan_of_several_worlds_has_counts_for_each():
     assert [effect in EFFECTS for effect in mixed.effects] == [True, False]
 
 
+def test_faster_recordings_of_a_slow_case_are_sealed(tmp_path):
+    draw_case("slow", "single", ("viscous_friction",), (7,), tmp_path, Manner("continuous", pace=0.5))
+
+    def most(path):
+        columns = np.genfromtxt(path, delimiter=",", names=True)
+        return max(np.abs(columns["left_duty_pct"]).max(), np.abs(columns["right_duty_pct"]).max())
+
+    slow = tmp_path / "cases" / "slow" / "run_07_reversals.csv"
+    fast = tmp_path / "sealed" / "slow" / "faster" / "run_07_reversals.csv"
+    assert most(slow) <= 40.0 < most(fast) <= 80.0
+    assert not list((tmp_path / "cases").rglob("faster"))
+
+
 def test_strengths_are_found_for_a_visibility():
     assert 40.0 * 12.0 ** (tuned(lambda share: 40.0 * 12.0**share, 100.0)) == pytest.approx(100.0, rel=0.2)
     limit = tuned(lambda share: 0.0 if share < 0.8 else 500.0 * share, 30.0)

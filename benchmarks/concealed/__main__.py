@@ -72,6 +72,12 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--seed", type=int, required=True)
     _ask_counts(plan)
     plan.add_argument("--last", action="store_true", help="also the kinds kept for the last examination")
+    plan.add_argument(
+        "--pace",
+        type=float,
+        default=1.0,
+        help="share of the usual duties; below 1, faster recordings are sealed beside each case",
+    )
     plan.set_defaults(command=_plan)
 
     exam = commands.add_parser("exam", help="all of it: draw, seal, run, score, write the tables; resumes")
@@ -174,7 +180,11 @@ def _draw(chosen: argparse.Namespace) -> int:
 def _plan(chosen: argparse.Namespace) -> int:
     from benchmarks.concealed.plan import draw_all, plan  # noqa: PLC0415
 
-    cases = plan(chosen.seed, _by_world(chosen), background=chosen.background == "on", last=chosen.last)
+    if not 0.1 <= chosen.pace <= 1.0:
+        message = f"--pace: found {chosen.pace}, expected 0.1 to 1"
+        raise ValueError(message)
+    background = chosen.background == "on"
+    cases = plan(chosen.seed, _by_world(chosen), background=background, last=chosen.last, pace=chosen.pace)
     print(draw_all(cases, chosen.out, chosen.workers))
     return 0
 

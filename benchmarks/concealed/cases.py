@@ -37,6 +37,7 @@ from benchmarks.concealed.worlds import truth
 
 KINDS = ("none", "single", "double", "triple", "mixed", "outside")
 ALL_OUTSIDE = {**OUTSIDE, **SEALED}
+FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
 _QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
@@ -56,10 +57,14 @@ class Manner:
     background
         Whether every robot has a little of many things, strengths are drawn by how visible they are, and robots and
         recordings vary. Without it cases are those of the first examinations.
+    pace
+        Share of the usual duties that the robot is driven with. Where it is less than 1, two recordings at the usual
+        duties are sealed beside the case: what is learned from slow ones can be judged by faster ones.
     """
 
     world: str = "mujoco"
     background: bool = False
+    pace: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -124,6 +129,8 @@ def draw_case(
     for attempt in itertools.count():
         try:
             hidden, case, worlds = _recorded(kind, effects, (*seed, attempt), folder, manner)
+            if manner.pace != 1.0:
+                _seal_faster(sealed / FASTER, hidden, case)
             break
         # A robot this tall, or a ridge this high: nobody would keep the recording; draw again.
         except ToppledError:
@@ -137,10 +144,22 @@ def draw_case(
     about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed)}
     about |= {"conditions": _stated(case.conditions), "runs": runs, "holdout": _holdout(len(runs))}
     about |= {"robot": _plain(hidden.robots[0])}
+    if manner.pace != 1.0:
+        about |= {"pace": manner.pace}
     if manner.background or manner.world != "mujoco":
         about |= {"world": manner.world, "setting": case.setting.as_label()}
         about |= _measured(hidden, case, worlds)
     (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
+
+
+def _seal_faster(folder: Path, hidden: Hidden, case: Case) -> None:
+    """Record the same robot at the usual duties, once for each recording to judge by."""
+    folder.mkdir(exist_ok=True)
+    runs = case.setting.runs
+    seeds = np.random.SeedSequence(entropy=case.seeds[0].entropy, spawn_key=(len(runs), 1)).spawn(len(runs))
+    usual = replace(case, manner=replace(case.manner, pace=1.0), seeds=seeds)
+    for run in _holdout(len(runs)):
+        record(folder / f"run_{run + 1:02d}_{runs[run]}.csv", run, hidden, usual)
 
 
 def _recorded(
@@ -288,7 +307,9 @@ def _amounts(
 
 def act(run: int, robot: Concealed, case: Case) -> Act:
     """Let a robot choose the commands of one recording: a line follower's depend on who drives."""
-    start, controller = _task(case.setting.runs[run], np.random.default_rng(case.seeds[run]), case.base)
+    start, controller = _task(
+        case.setting.runs[run], np.random.default_rng(case.seeds[run]), case.base, case.manner.pace
+    )
     ticks = case.conditions.row_ticks
     history = truth(case.manner.world, robot).run(start, controller, SECONDS, turn_ticks=ticks)
     return Act(start, history.commands[::ticks], case.conditions.camera_offset_s(run))
@@ -337,7 +358,7 @@ def record(path: Path, run: int, hidden: Hidden, case: Case) -> dict[str, Array]
     """Drive one recording, write it, and return the noise-free channels of every world."""
     robot, conditions, rng = hidden.robots[run], case.conditions, np.random.default_rng(case.seeds[run])
     offset, ticks = conditions.camera_offset_s(run), conditions.row_ticks
-    start, controller = _task(case.setting.runs[run], rng, case.base)
+    start, controller = _task(case.setting.runs[run], rng, case.base, case.manner.pace)
     rows = round(SECONDS * 100) + 1
     reading_noise = np.repeat(noise("reflection_pct", rows, conditions, rng), ROW_TICKS)[
         : (rows - 1) * ROW_TICKS + 1
@@ -386,11 +407,23 @@ def _measured(hidden: Hidden, case: Case, worlds: Mapping[str, Array]) -> dict[s
     return {"d_prime": loud, "size": sizes}
 
 
-def _task(kind: str, rng: Rng, base: Base) -> tuple[Pose, Controller]:
+def _task(kind: str, rng: Rng, base: Base, pace: float = 1.0) -> tuple[Pose, Controller]:
     if kind.startswith("line"):
-        return line_follower(kind, rng)
-    start, commands = script(kind, rng, base)
-    return start, replayed(commands)
+        start, controller = line_follower(kind, rng)
+    else:
+        start, commands = script(kind, rng, base)
+        controller = replayed(commands)
+    return start, controller if pace == 1.0 else _at_pace(controller, pace)
+
+
+def _at_pace(controller: Controller, pace: float) -> Controller:
+    """Return a controller that asks for a share of the duties, in whole percents."""
+
+    def slower(time_s: float, reading: int) -> tuple[int, int] | None:
+        duties = controller(time_s, reading)
+        return None if duties is None else (round(pace * duties[0]), round(pace * duties[1]))
+
+    return slower
 
 
 def _conditions(rng: Rng, effects: Sequence[str], runs: int) -> Conditions:

@@ -58,6 +58,7 @@ def plan(
     *,
     background: bool = False,
     last: bool = False,
+    pace: float = 1.0,
 ) -> list[Planned]:
     """List the cases of an examination.
 
@@ -71,6 +72,8 @@ def plan(
         Whether robots have a background; see :class:`benchmarks.concealed.cases.Manner`.
     last
         Whether the kinds kept for the last examination are drawn, too.
+    pace
+        Share of the usual duties; see :class:`benchmarks.concealed.cases.Manner`.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def plan(
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0)))
     contents: list[tuple[str, tuple[str, ...], Manner]] = []
     for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
-        manner = Manner(world, background)
+        manner = Manner(world, background, pace)
         contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, last)]
     order = rng.permutation(len(contents))
     return [

@@ -108,32 +108,21 @@ def _thresholded(equations: Sequence[tuple[Array, Terms]]) -> dict[str, tuple[fl
 
 
 def _torques(recording: Recording, robot: Robot) -> list[Equation]:
-    """Return what torque is left over at each shaft [N m] by the nominal motor, robot and friction.
-
-    M dw/dt = K (u V - Ke w) - c sign(w), K = Kt / R; M couples both shafts through the robot's mass and yaw inertia;
-    a centre of mass behind the axle pulls in turns.
-    """
-    p, t = robot.physics[0], _even(recording.t_s, recording.t_s)
+    """Return what torque is left over at each shaft that moves [N m], and what effects would add to it."""
+    p, t = robot.physics[0], even(recording.t_s, recording.t_s)
     angles = np.column_stack([recording.left_angle_rad, recording.right_angle_rad])
     if np.isnan(angles).all():
         return []
-    angles = np.column_stack([_even(recording.t_s, a) for a in angles.T])
+    angles = np.column_stack([even(recording.t_s, a) for a in angles.T])
     duty = np.column_stack([np.interp(t, recording.t_s, u) for u in recording.commands.T])
+    left = leftover_torques(angles, duty, robot)
     duty = np.clip(duty, -p["duty_cap"], p["duty_cap"])
-    w, dw, duty, du = _slope(angles), _slope(angles, 2), _slope(duty, 0), _slope(duty)
-    ahead = p["mass"] * p["wheel_radius"] ** 2 / 4.0
-    mount = p["mass"] * p["com_ahead"]
-    aside = (p["yaw_inertia"] + mount * p["com_ahead"]) * p["wheel_radius"] ** 2 / p["track_width"] ** 2
-    own, other = p["inertia"] + ahead + aside, ahead - aside
+    w, duty, du = slope(angles), slope(duty, 0), slope(duty)
     gain, sign = p["torque_constant"] / p["resistance"], np.sign(w) * (np.abs(w) > RESTING)
     drive = gain * (duty * p["voltage"] - p["back_emf_constant"] * w)
-    left = own * dw + other * dw[:, ::-1] - drive + p["coulomb_friction"] * sign
-    turn = p["wheel_radius"] * (w[:, 1] - w[:, 0]) / p["track_width"]
-    swing = mount * p["wheel_radius"] ** 2 / p["track_width"] * turn * w.mean(axis=1)
-    left += (-0.5 * p["wheel_radius"] * mount * turn**2)[:, None] + swing[:, None] * np.array([-1.0, 1.0])
     drawn = np.sum(np.abs(duty * drive) / p["torque_constant"], axis=1)
     full = gain * p["voltage"]
-    heading = _even(recording.t_s, recording.heading_rad)
+    heading = even(recording.t_s, recording.heading_rad)
     # Both wheels share a pull along the floor; without a heading there is none to see.
     pull = np.full(2, 0.5 * p["mass"] * GRAVITY * p["wheel_radius"] * np.any(heading))
     columns = {
@@ -148,20 +137,51 @@ def _torques(recording: Recording, robot: Robot) -> list[Equation]:
     return [(left.ravel()[moving], {f: g.ravel()[moving] for f, g in columns.items()}, TORQUE_NM)]
 
 
+def leftover_torques(angles: Array, duty: Array, robot: Robot) -> Array:
+    """Return what torque is left over at each shaft [N m] by the nominal motor, robot and friction, shape (n, 2).
+
+    M dw/dt = K (u V - Ke w) - c sign(w), K = Kt / R; M couples both shafts through the robot's mass and yaw inertia;
+    a centre of mass behind the axle pulls in turns.
+
+    Parameters
+    ----------
+    angles, duty
+        Of both shafts, at even times 10 ms apart [rad, -1..1], shape (n, 2).
+    robot
+        The robot as it is known.
+    """
+    p = robot.physics[0]
+    w, dw = slope(angles), slope(angles, 2)
+    duty = slope(np.clip(duty, -p["duty_cap"], p["duty_cap"]), 0)
+    ahead = p["mass"] * p["wheel_radius"] ** 2 / 4.0
+    mount = p["mass"] * p["com_ahead"]
+    aside = (p["yaw_inertia"] + mount * p["com_ahead"]) * p["wheel_radius"] ** 2 / p["track_width"] ** 2
+    own, other = p["inertia"] + ahead + aside, ahead - aside
+    gain, sign = p["torque_constant"] / p["resistance"], np.sign(w) * (np.abs(w) > RESTING)
+    drive = gain * (duty * p["voltage"] - p["back_emf_constant"] * w)
+    left = own * dw + other * dw[:, ::-1] - drive + p["coulomb_friction"] * sign
+    turn = p["wheel_radius"] * (w[:, 1] - w[:, 0]) / p["track_width"]
+    swing = mount * p["wheel_radius"] ** 2 / p["track_width"] * turn * w.mean(axis=1)
+    out: Array = (
+        left - (0.5 * p["wheel_radius"] * mount * turn**2)[:, None] + swing[:, None] * np.array([-1.0, 1.0])
+    )
+    return out
+
+
 def _rolling(recording: Recording, robot: Robot) -> list[Equation]:
     """Return what speed ahead [m/s] and turning rate [rad/s] are left over by wheels that roll."""
     p, at = robot.physics[0], recording.t_s
-    x, y, heading = (_even(at, c) for c in (recording.x_m, recording.y_m, recording.heading_rad))
-    angles = np.column_stack([_even(at, a) for a in (recording.left_angle_rad, recording.right_angle_rad)])
+    x, y, heading = (even(at, c) for c in (recording.x_m, recording.y_m, recording.heading_rad))
+    angles = np.column_stack([even(at, a) for a in (recording.left_angle_rad, recording.right_angle_rad)])
     if not (np.any(x) and np.any(angles)):
         return []
-    v = _slope(x) * np.cos(heading) + _slope(y) * np.sin(heading)
-    wheels, turn = _slope(angles) * p["wheel_radius"], _slope(heading)
+    v = slope(x) * np.cos(heading) + slope(y) * np.sin(heading)
+    wheels, turn = slope(angles) * p["wheel_radius"], slope(heading)
     ahead, turned = wheels.mean(axis=1), (wheels[:, 1] - wheels[:, 0]) / p["track_width"]
-    straight = {"radius_scale": ahead, "pose_delay": -_slope(ahead)}
+    straight = {"radius_scale": ahead, "pose_delay": -slope(ahead)}
     turning = {
         "radius_scale": turned, "radius_difference": ahead / p["track_width"], "track_scale": -turned,
-        "pose_delay": -_slope(turned),
+        "pose_delay": -slope(turned),
     }  # fmt: skip
     return [(v - ahead, straight, SPEED_M_S), (turn - turned, turning, TURN_RAD_S)]
 
@@ -172,18 +192,24 @@ def _sensor(run: RecordingResiduals, robot: Robot) -> Equation:
     seen = ~np.isnan(told) & ~np.isnan(run.recording.reflection_pct)
     if not seen.any():
         return np.zeros(0), {}, 1.0
-    columns = {"sensor_gain": told, "sensor_offset": np.ones(len(told)), "sensor_delay": -_slope(told)}
+    columns = {"sensor_gain": told, "sensor_offset": np.ones(len(told)), "sensor_delay": -slope(told)}
     left = run.recording.reflection_pct - told
     return left[seen], {f: g[seen] for f, g in columns.items()}, READING_PCT
 
 
-def _even(t: Array, values: Array) -> Array:
+def even(t: Array, values: Array) -> Array:
     """Return values at even times 10 ms apart, gaps bridged; 0 where there are none."""
     seen = ~np.isnan(values)
     grid = np.arange(t[0], t[-1], ROW_S)
     return np.interp(grid, t[seen], values[seen]) if seen.any() else np.zeros(len(grid))
 
 
-def _slope(values: Array, order: int = 1) -> Array:
-    """Return a derivative of the smoothed values; the values themselves for order 0."""
+def slope(values: Array, order: int = 1) -> Array:
+    """Return the first or second derivative of the smoothed values; the values themselves for order 0.
+
+    The second is a derivative of differences: the second derivative of a normal weight that is cut off has a mean, and
+    gives an angle of many turns an acceleration.
+    """
+    if order == 2:
+        return slope(np.gradient(values, ROW_S, axis=0))
     return np.asarray(gaussian_filter1d(values, SMOOTH_ROWS, axis=0, order=order) / ROW_S**order)
