@@ -26,6 +26,7 @@ from gecar.reality.invent.sentences import physics_grammar
 from gecar.reality.recordings.recording import read_case
 from gecar.report.table import piped
 from gecar.world.effects import CATALOGUE
+from gecar.world.robot import write_robot
 
 _MOTOR = ("motor_torque", "command", "gear_friction")
 _FORCE = ("force_x", "force_y", "force_toward")
@@ -75,8 +76,8 @@ NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""
 
 
-def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any]:
-    """Return what a case's verdict says with laws asked for, and what it is worth."""
+def look_at(folder: Path, label: dict[str, Any], out: Path, seed: int = 0) -> dict[str, Any]:
+    """Return what a case's verdict says with laws asked for, and what it is worth; ``out`` gets the robot's file."""
     concealed = [effect["id"] for effect in label["effects"]]
     outside = (label.get("outside") or {}).get("id")
     single = len(concealed) == 1 and outside is None
@@ -86,6 +87,7 @@ def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any
         read_case(folder), seed=seed, workers=1, catalogue=catalogue, language=physics_grammar(), invents=True
     )
     table = verdict.as_json()
+    write_robot(verdict.robot, out / f"{folder.name}.toml")
     return json_ready(
         {
             "kind": "none" if not concealed and outside is None else "single" if single else "outside",
@@ -93,6 +95,7 @@ def look_at(folder: Path, label: dict[str, Any], seed: int = 0) -> dict[str, Any
             "verdict": verdict.verdict,
             "effects": [found.id for found in verdict.effects],
             "material": verdict.residual.material,
+            "clocks_fitted": verdict.evidence.motion.problem.clocks_fitted,
             "gap_closed": verdict.judgement.gap_closed,
             "invented": table["invented"],
             "typeset": [law.term.typeset for law in verdict.invented],
@@ -176,7 +179,10 @@ def main() -> None:
     }
     waiting = [name for name in labels if not (given.out / f"{name}.json").exists()]
     with ProcessPoolExecutor(given.workers) as pool:
-        jobs = {pool.submit(look_at, given.cases / "cases" / name, labels[name]): name for name in waiting}
+        jobs = {
+            pool.submit(look_at, given.cases / "cases" / name, labels[name], given.out): name
+            for name in waiting
+        }
         for job in as_completed(jobs):
             if job.exception() is not None:
                 print(f"{jobs[job]}: no verdict: {job.exception()}", flush=True)

@@ -21,6 +21,8 @@ from gecar.plots.reality.law import laws_figure
 from gecar.plots.style import is_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.looks import looks_like
+from gecar.reality.invent.proof import simplified
+from gecar.reality.invent.search import Library, fit
 from gecar.reality.invent.sentences import (
     complexity,
     joined,
@@ -30,7 +32,12 @@ from gecar.reality.invent.sentences import (
     read_sentence,
     single_laws,
 )
+from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, read_case
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.observability import observable
+from gecar.reality.selection.problem import problem_of
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_html
 from gecar.world.effects import CATALOGUE
@@ -121,20 +128,38 @@ def test_what_has_no_derivative_at_none_is_found_by_finite_probes(hidden, size):
     assert law.spread < 0.1
 
 
+def library_of(*tables):
+    runs = [recorded(robot_with(*map(dict, tables)), seed) for seed in range(5)]
+    fitted = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    problem = problem_of(fitted, EV3, observable(UNRELATED, fitted))
+    problem = problem.under(problem.known)
+    return Library(problem, problem.known)
+
+
 def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
-    language = parse_grammar(
-        "<t> ::= motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
-    )
-    (law,) = verdict_on(DRAG, language=language).invented
-    assert law.term.law == "c1 * speed * abs(speed)"
+    library = library_of(DRAG)
+    sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
+    law = fit(library, library.started(read_sentence(sum_of_three)))
+    assert [term.law for term in simplified(library, law).terms] == ["c1 * speed * abs(speed)"]
+
+
+def test_a_language_without_a_law_of_one_part_writes_none():
+    language = parse_grammar("<t> ::= motor_torque: c * speed * abs(speed) + c * sin(2 * angle)")
+    assert verdict_on(DRAG, language=language).invented == ()
 
 
 def test_without_a_camera_no_law_speaks_of_places():
     runs = [recorded(robot_with(*map(dict, TILT)), seed) for seed in range(4)]
-    blind = tuple(replace(r, **{f: np.full(len(r.t_s), np.nan) for f in ("x_m", "y_m", "heading_rad")}) for r in runs)
+    blind = tuple(
+        replace(r, **{f: np.full(len(r.t_s), np.nan) for f in ("x_m", "y_m", "heading_rad")}) for r in runs
+    )
     verdict = discover(Case("blind", blind), catalogue=UNRELATED, language=FEW, invents=True)
     assert not {law.term.port for law in verdict.invented} & {"force_x", "force_y", "force_toward"}
-    assert not {name for law in verdict.invented for name in law.term.parsed.variables} & {"x", "y", "heading"}
+    assert not {name for law in verdict.invented for name in law.term.parsed.variables} & {
+        "x",
+        "y",
+        "heading",
+    }
 
 
 def test_the_robot_found_carries_the_law(tmp_path):

@@ -14,7 +14,7 @@ from benchmarks.concealed.colour_sensor import FIELD, TILE
 from benchmarks.concealed.history import ROW_TICKS, Array, Controller, History, Pose
 from benchmarks.concealed.recording import Conditions, channels, even_ticks, noise, write_recording
 from benchmarks.concealed.robot import Concealed
-from benchmarks.concealed.truth import Truth
+from benchmarks.concealed.worlds import truth
 
 # Opcode rows: operation, a, b, c, target, line.
 MOTOR, MOTOR_UNTIL, TEST, JUMP = range(4)
@@ -128,6 +128,7 @@ def drive(
     seed: int = 0,
     path: Path | None = None,
     conditions: Conditions | None = None,
+    world: str = "mujoco",
 ) -> Round:
     """Let a program drive a concealed robot round the paper's course.
 
@@ -146,6 +147,8 @@ def drive(
         every change of the command.
     conditions
         Noise and columns of the recording.
+    world
+        One of ``WORLDS``.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def drive(
     reading_noise = np.repeat(noise("reflection_pct", count // ROW_TICKS + 1, conditions, rng), ROW_TICKS)[
         :count
     ]
-    history = Truth(concealed).run(start, interpret(rows), TIME_LIMIT_S, reading_noise, 1, _ended)
+    history = truth(world, concealed).run(start, interpret(rows), TIME_LIMIT_S, reading_noise, 1, _ended)
     result = referee(history)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -96,9 +96,9 @@ def invent(
         if len(here.problem.estimator.robot.term) == N_TERMS:
             break
         library = Library(here.problem, here.taken)
-        unknown = frozenset() if _placed(problem) else OF_PLACE
+        unknown = frozenset[str]() if _placed(problem) else OF_PLACE
         found = search(library, grammar, ports, seed + number, tell, unknown)
-        proved = _first_proved(library, found, largest_gains(library, seed))
+        proved = _first_proved(library, found, largest_gains(library, seed)) if found else None
         if proved is None:
             break
         law, proof = proved
