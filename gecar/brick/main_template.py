@@ -1,9 +1,9 @@
 """The text of main.py around the program: MicroPython 1.11, so no f-strings and nothing newer.
 
-Words in double brackets are filled in by `gecar.brick.export`. Facts that shaped it: the ``Back`` button (on a SPIKE hub
-the Bluetooth button) ends a program at once, unsaved; ``print`` and the log's file take milliseconds a line, so the run
-is kept in memory, 17 bytes a row, and written after it, which also leaves little for the garbage collector to stop the
-robot for.
+Words in double brackets are filled in by `gecar.brick.export`. Facts that shaped it: the ``Back`` button (on a SPIKE
+hub the Bluetooth button) ends a program at once, unsaved. ``print`` and the log's file take milliseconds a line, so the
+run is kept in memory, 17 bytes a row, and written after it, which also leaves little for the garbage collector to stop
+the robot for.
 """
 
 SHEBANG = "#!/usr/bin/env pybricks-micropython\n"

@@ -183,7 +183,7 @@ class Library:
         again = np.flatnonzero((rms > LARGE_RESPONSE) | (rms < SMALL_RESPONSE))
         if len(again):
             sizes[again] = np.clip(0.3 / np.maximum(rms[again], 1e-9), 1e-4, 100.0)
-            changes[again] = self._changes([parts[k] for k in again], sizes[again])
+            changes[again] = self._changes([parts[k] for k in again.tolist()], sizes[again])
         slopes = changes / sizes[:, None]
         steeper = np.sqrt(np.mean(np.square(slopes), axis=1)) / np.maximum(rms, 1e-9)
         uneven = (rms < SMALL_RESPONSE) & ((steeper > UNEVEN) | (steeper < 1.0 / UNEVEN))
