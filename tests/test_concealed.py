@@ -294,3 +294,12 @@ def test_motor_until_ends_with_its_test():
 def test_program_that_waits_for_nothing_is_stuck():
     assert program.interpret([])(0.0, 50) is None
     assert program.interpret([[3, 0, 0, 0, 0, 1]])(0.0, 50) is None
+
+
+def test_a_pass_that_takes_no_time_polls_when_it_is_asked_next():
+    turn = program.interpret(
+        [[2, 0, 0, 75_000, 3, 1], [0, 70, 80, 0, 0, 2], [3, 0, 0, 0, 4, 2], [0, 40, -80, 0, 0, 4]]
+    )
+    assert [turn(0.001 * k, reading) for k, reading in enumerate((100, 100, 10, 80))] == [
+        (70, 80), (70, 80), (40, -80), (70, 80),
+    ]  # fmt: skip

@@ -7,7 +7,8 @@ import pytest
 from concealing import EV3, recorded
 
 from benchmarks.concealed.comparators.sparse import even, leftover_torques
-from benchmarks.rivals import Lesson, _replayed_with, sindy
+from benchmarks.rivals.acting import acting
+from benchmarks.rivals.methods import Lesson, sindy
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.terms import Term
 
@@ -21,7 +22,7 @@ def nothing(seen):
 def test_a_torque_that_was_learned_moves_a_replay_as_a_law_does():
     replayer = replayer_of(recorded(EV3, 3))
     plain, wanted = (replayer.play(robot.physics) for robot in (EV3, WEAK))
-    found, poses = _replayed_with(lambda seen: -0.02 * seen[:, 0], nothing, nothing, EV3)(
+    found, poses = acting(lambda seen: -0.02 * seen[:, 0], nothing, nothing, EV3)(
         replayer, plain.rows, plain.poses
     )
     apart = np.abs(wanted.rows - plain.rows).max(axis=0)

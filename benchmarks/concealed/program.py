@@ -73,7 +73,8 @@ def interpret(rows: Sequence[Sequence[int]]) -> Controller:
     Returns
     -------
     Controller
-        To be asked every millisecond; ``None`` once the program waits for nothing.
+        To be asked every millisecond. A pass that takes no time goes on when it is asked next, as on the brick;
+        ``None`` where no test could ever change that.
 
     Raises
     ------
@@ -84,24 +85,27 @@ def interpret(rows: Sequence[Sequence[int]]) -> Controller:
     if any(row[0] == TEST and row[1] != 0 for row in table):
         message = "this robot has one colour sensor (sensor 0)"
         raise ValueError(message)
+    tests = any(row[0] in (TEST, MOTOR_UNTIL) for row in table)
     at, until, duties = 0, 0.0, (0, 0)
 
     def turn(time_s: float, reading: int) -> tuple[int, int] | None:
         nonlocal at, until, duties
+        begun = False
         for _ in range(_MOST_JUMPS):
             if until > time_s + 1e-9:
                 test = table[at - 1] if _waits_for(table, at) else None
                 if test is None or not _holds(test, reading):
                     return duties
                 until = time_s
-            if not table:
-                return None
+            if not table or (begun and at % len(table) == 0):
+                break
+            begun = begun or at % len(table) == 0
             at, row = _advance(table, at)
             if row[0] in (MOTOR, MOTOR_UNTIL):
                 duties, until = (row[1], row[2]), time_s + row[3] / 1000.0
             elif row[0] == JUMP or not _holds(row, reading):
                 at = row[4]
-        return None
+        return duties if tests else None
 
     return turn
 
