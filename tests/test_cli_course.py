@@ -5,7 +5,7 @@ from PIL import Image
 def test_list_gives_every_course_with_its_lower_bound(gecar):
     ended = gecar("course", "list", "--json")
     assert {"paper", "hairpin"} <= set(ended.json["courses"])
-    assert all(5 < course["lower_bound_s"] < 60 for course in ended.json["courses"].values())
+    assert all(3 < course["lower_bound_s"] < 60 for course in ended.json["courses"].values())
     assert "The paper's course" in ended.err
 
 

@@ -137,7 +137,7 @@ def test_a_grammar_is_found_by_name_and_by_path(tmp_path: Path, monkeypatch: pyt
     assert alternatives(load_grammar("ours")) == alternatives(load_grammar("ours.bnf")) == [("ours",)]
     assert load_grammar("rich").start == "<code>"
     with pytest.raises(
-        InputError, match=r"'none', expected a \.bnf file or one of keijzer_6, nested, ours, paper"
+        InputError, match=r"'none', expected a \.bnf file or one of keijzer_6, memory, nested, ours, paper"
     ):
         load_grammar("none")
     with pytest.raises(InputError, match="directory"):

@@ -68,6 +68,6 @@ def test_robots_that_ship_are_listed_and_shown(gecar):
 
 def test_an_unknown_robot_is_refused_with_those_there_are():
     with pytest.raises(
-        InputError, match=r"'paperr', expected a robot file .* ev3, paper, paper_ev3, worn_ev3"
+        InputError, match=r"'paperr', expected a robot file .* ev3, paper, paper_ev3, spike, worn_ev3"
     ):
         load_robot("paperr")

@@ -126,8 +126,8 @@ def test_a_second_population_may_begin_and_then_programs_grow_from_the_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     evolving, begun = evolution("grows"), []
-    begin = evolving._breeder.begin
-    monkeypatch.setattr(evolving._breeder, "begin", lambda *args: begun.append(args[0]) or begin(*args))
+    begin = evolving._reproduction.begin
+    monkeypatch.setattr(evolving._reproduction, "begin", lambda *args: begun.append(args[0]) or begin(*args))
     lengths = []
     while not evolving.finished:
         longest = max(len(evolving.best.program.opcodes), 1) if evolving.history else 1
@@ -268,7 +268,7 @@ def test_parents_say_whom_each_child_comes_from() -> None:
     assert (evolving.parents == -1).all()
     before = evolving.genomes
     evolving.ask()
-    for child, (one, other) in zip(evolving._bred.genomes, evolving.parents, strict=True):
+    for child, (one, other) in zip(evolving._offspring.genomes, evolving.parents, strict=True):
         assert child[0] == before[one, 0]
         assert ((child == before[one]) | (child == before[other])).all()
 
