@@ -100,10 +100,13 @@ def read_program(path: Path) -> Program:
     return program
 
 
+_READS = np.isin(np.arange(opcodes.LOOP + 1), opcodes.READING_OPS)  # by kind of row
+
+
 def sensors_used(rows: Opcodes) -> npt.NDArray[np.bool_]:
     """Return which of the sensors (centre, left, right) a program's rows read, shape (3,)."""
     used = np.zeros(3, np.bool_)
-    used[rows[np.isin(rows[:, opcodes.OP], opcodes.READING_OPS), opcodes.A]] = True
+    used[rows[_READS[rows[:, opcodes.OP]], opcodes.A]] = True
     return used
 
 
