@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +20,9 @@ import numpy.typing as npt
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.parallel.executors import usable_cores
-from gecar.world.kernel.conditions import Conditions, joined
+from gecar.world.kernel.conditions import Conditions
 from gecar.world.perturbation import drawn_conditions
-from gecar.world.rollout import Fleet, Outcome, World
+from gecar.world.rollout import Fleet, World, goal_times
 
 ROUNDS = 8
 """Sets of drawn conditions after which a program is not driven again."""
@@ -82,9 +81,9 @@ def pool(score: np.void, share: float) -> None:
     times = np.concatenate([[score["fitness_s"]], drawn[~np.isnan(drawn)]])
     arrived = np.isfinite(times)
     enough = arrived.mean() >= share and score["slowest_s"] < np.inf
-    score["merit"] = (
-        max(np.median(times[arrived]), score["slowest_s"]) * _unsteady(score) if enough else UNSOLVED
-    )
+    score["merit"] = UNSOLVED
+    if enough:
+        score["merit"] = max(np.median(times[arrived]), score["slowest_s"]) * _unsteady(score)
     score["share"] = 1.0 if enough else 0.5 + 0.5 * arrived.sum() / max(len(drawn) / ROUNDS + 1, len(times))
 
 
@@ -178,17 +177,14 @@ def times_to_goal(
     threads = 1 if world.uses_pymunk else usable_cores()
     with ThreadPoolExecutor(threads) as pool:
         summary = np.concatenate(list(pool.map(driven, np.array_split(np.arange(len(pairs)), threads))))
-    times: Floats = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
-    return times.reshape(shape)
+    return goal_times(summary).reshape(shape)
 
 
 def drives_at_steps(
     world: World, programs: Sequence[npt.NDArray[np.int32]], steps_s: Sequence[float], seed: int = 0
 ) -> Floats:
     """Return the nominal robot's times to GOAL at other steps [s], inf where it misses it, shape (programs, steps)."""
-    return times_to_goal(
-        world, programs, joined([replace(world, step_s=step).nominal for step in steps_s]), seed
-    )
+    return times_to_goal(world, programs, world.at_steps(steps_s), seed)
 
 
 def times_at_steps(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0) -> dict[str, float | None]:

@@ -16,9 +16,9 @@ from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.parallel.pickled import Pickled, unpickled
 from gecar.search.chance import FIRST_DRAWS, MARGIN, n_times, pool
 from gecar.search.fitness import score_type
-from gecar.world.kernel.conditions import Conditions, joined
+from gecar.world.kernel.conditions import Conditions
 from gecar.world.perturbation import drawn_conditions, drawn_steps_s
-from gecar.world.rollout import Fleet, Outcome, World
+from gecar.world.rollout import Fleet, Outcome, World, goal_times
 
 Opcodes = npt.NDArray[np.int32]
 Evaluator = Callable[[Sequence[Opcodes], Sequence[int], float, int], Scores]
@@ -110,13 +110,10 @@ class DriveEvaluator:
             )
             if end <= begin or len(left) == 0:
                 return
-            k, row = (axis.ravel() for axis in np.meshgrid(left, np.arange(begin, end), indexing="ij"))
+            k, row = _pairs(left, np.arange(begin, end))
             drive_number = generation * self.draws + row + 1
             streams = np.array(seeds, np.uint64)[k] + drive_number.astype(np.uint64) * _NEXT_STREAM
-            summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
-            at_goal = summary["outcome"] == Outcome.GOAL
-            scores["drawn_s"][k, row] = np.where(at_goal, summary["time_s"], np.inf)
-            np.add.at(scores["steps"], k, summary["steps"])
+            scores["drawn_s"][k, row] = self._driven(scores, programs, k, under, row, streams)
         missed = np.isinf(scores["drawn_s"]).sum(axis=1)
         self._at_other_steps(scores, left[missed[left] <= allowed], programs, seeds, generation)
 
@@ -128,16 +125,29 @@ class DriveEvaluator:
         seeds: Sequence[int],
         generation: int,
     ) -> None:
-        """Drive the nominal robot at the generation's steps by what came through the race."""
-        steps = drawn_steps_s((self.seed, generation))
-        under = joined([replace(self.world, step_s=step).nominal for step in steps])
-        k, row = (axis.ravel() for axis in np.meshgrid(left, np.arange(len(under)), indexing="ij"))
-        streams = np.array(seeds, np.uint64)[k]
-        summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
-        times = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+        """Drive the nominal robot at the generation's steps by what came through both stages of the race.
+
+        Up to `FIRST_DRAWS` + 1 draws there is one stage, and no such drive.
+        """
+        under = self.world.at_steps(drawn_steps_s((self.seed, generation)))
+        k, row = _pairs(left, np.arange(len(under)))
+        times = self._driven(scores, programs, k, under, row, np.array(seeds, np.uint64)[k])
         np.maximum.at(scores["slowest_s"], k, times)
         np.minimum.at(scores["fastest_s"], k, times)
+
+    def _driven(
+        self,
+        scores: Scores,
+        programs: Sequence[Opcodes],
+        k: npt.NDArray[np.intp],
+        under: Conditions,
+        row: npt.NDArray[np.intp],
+        streams: npt.NDArray[np.uint64],
+    ) -> npt.NDArray[np.float64]:
+        """Drive programs ``k`` under conditions ``row``; return times to GOAL [s]; the scores count the steps."""
+        summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
         np.add.at(scores["steps"], k, summary["steps"])
+        return goal_times(summary)
 
     def _shares(self, arrival: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """How far along the course drives came: tiles in order, and among equals who was there sooner, 0..1."""
@@ -160,6 +170,13 @@ class DriveEvaluator:
         """Pickle without what can be made again: a course without its raster is 2 kB instead of 3 MB."""
         bare = replace(self.world, course=replace(self.world.course))
         return DriveEvaluator, (bare, self.keep_arrivals, self.draws, self.required_share, self.seed)
+
+
+def _pairs(
+    k: npt.NDArray[np.intp], row: npt.NDArray[np.intp]
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return every program with every condition, shapes (n,)."""
+    return np.repeat(k, len(row)), np.tile(row, len(k))
 
 
 _NEXT_STREAM = np.uint64(0x9E3779B97F4A7C15)

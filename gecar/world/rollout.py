@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -15,7 +15,7 @@ from gecar.language.opcodes import N_COLUMNS
 from gecar.language.program import sensors_used
 from gecar.world.course.course import Course
 from gecar.world.kernel.chipmunk import NO_ENGINE
-from gecar.world.kernel.conditions import Conditions, conditions, select
+from gecar.world.kernel.conditions import Conditions, conditions, joined, select
 from gecar.world.kernel.drive import Setup, drive
 from gecar.world.kernel.dynamics import has_terms
 from gecar.world.kernel.eyes import EYES, Floor
@@ -154,6 +154,10 @@ class World:
         noise = self.noise.sensor_pct, self.noise.motor_share
         return conditions(self.robot.physics, self.step_s, self.start, self.time_limit_s, 0.0, *noise)
 
+    def at_steps(self, steps_s: Sequence[float]) -> Conditions:
+        """Return the conditions of this world at other steps [s], one row each."""
+        return joined([replace(self, step_s=step).nominal for step in steps_s])
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -270,6 +274,12 @@ def simulate(world: World, opcodes: npt.NDArray[np.int32], seed: int = 0, trace:
 
 
 SUMMARY = np.dtype([("outcome", np.int8), ("time_s", float), ("checkpoints", np.int32), ("steps", np.int64)])
+
+
+def goal_times(summary: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+    """Return the times to GOAL of summaries [s], inf where it was missed, shape (n,)."""
+    times: npt.NDArray[np.float64] = np.where(summary["outcome"] == Outcome.GOAL, summary["time_s"], np.inf)
+    return times
 
 
 class Fleet:
