@@ -22,7 +22,7 @@ from gecar.reality.fitting.model import Effects, Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
-from gecar.reality.invent.proof import Proof, largest_gains, left_out_gains, simplified
+from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, search
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
@@ -135,8 +135,8 @@ def _placed(problem: Problem) -> bool:
 
 def _first_proved(library: Library, found: Sequence[Law], nulls: Array) -> tuple[Law, Proof] | None:
     """Return the best law that left-out recordings ask for, with its proof; None where the best few are all chance."""
-    for law in (simplified(library, each) for each in found[:TRIED] if each.worth >= PRICE):
-        proof = Proof(left_out_gains(library, law), nulls)
+    for law, gains in (simplified(library, each) for each in found[:TRIED] if each.worth >= PRICE):
+        proof = Proof(gains, nulls)
         if law.worth >= PRICE and proof.holds and _spread(library, law) < UNSTEADY:
             return law, proof
     return None

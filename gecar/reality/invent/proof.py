@@ -62,18 +62,17 @@ def left_out_gains(library: Library, law: Law) -> Array:
     return out
 
 
-def simplified(library: Library, law: Law) -> Law:
-    """Return a law without the parts that left-out recordings do not ask for beside the others."""
-    while True:
-        shorter = [fit(library, rest) for rest in shortened(law.terms)]
-        if not shorter:
-            return law
-        gains = left_out_gains(library, law)
-        asked = [gains - left_out_gains(library, rest) for rest in shorter]
-        least = min(range(len(asked)), key=lambda k: asked[k].sum())
-        if asked[least].sum() >= PRICE and np.mean(asked[least] > 0.0) > 0.5:
-            return law
-        law = shorter[least]
+def simplified(library: Library, law: Law) -> tuple[Law, Array]:
+    """Return a law without the parts that left-out recordings do not ask for, and what it gains on them, (folds,)."""
+    gains = left_out_gains(library, law)
+    while shorter := [fit(library, rest) for rest in shortened(law.terms)]:
+        without = [left_out_gains(library, rest) for rest in shorter]
+        least = min(range(len(shorter)), key=lambda k: (gains - without[k]).sum())
+        asked = gains - without[least]
+        if asked.sum() >= PRICE and np.mean(asked > 0.0) > 0.5:
+            break
+        law, gains = shorter[least], without[least]
+    return law, gains
 
 
 def largest_gains(library: Library, seed: int) -> Array:

@@ -218,11 +218,11 @@ def _halved(
     names, share = np.unique(folds), np.ones(len(starts))
     before = np.array([cost(minimum.errors[folds != k]) for k in names])
     whole = (starts == minimum.z).all(axis=1)  # elsewhere a coordinate became 0, which may cost something
-    for factor in (*[0.5] * HALVINGS, 0.0, 0.0):
+    for tried in range(HALVINGS + 2):
         errors = residual(np.clip(starts + share[:, None] * steps, *bounds))
         after = np.array([cost(e[folds != k]) for k, e in zip(names, errors, strict=True)])
         worse = whole & (after > before + 1.0)
         if not worse.any():
             break
-        share[worse] *= factor
+        share[worse] *= 0.5 if tried < HALVINGS else 0.0
     return errors
