@@ -17,7 +17,12 @@ from gecar.language.statements import If, Statement, While
 from gecar.language.values import Sensor
 from gecar.world.robot import Robot
 
-TARGETS = ("pybricks2", "pybricks4", "spike")
+_TITLES = {
+    "pybricks2": "Drives a LEGO EV3 with EV3 MicroPython 2.0 (Pybricks).",
+    "pybricks4": "Drives a LEGO EV3 with Pybricks 4.",
+    "spike": "Drives a LEGO SPIKE Prime or Robot Inventor hub with Pybricks 3 or newer.",
+}
+TARGETS = tuple(_TITLES)
 TIME_LIMIT_S = 60  # the paper's
 MOST_STATEMENTS = 1000  # MicroPython's jumps reach 32 kB: an if of more statements would not compile
 MOST_ROWS = 3000  # for the same reason, those of calculation counted
@@ -153,8 +158,8 @@ def _main(program: Program, robot: Robot, target: str, ports: Ports) -> str:
         _robot_words(robot, ports)
         | _hub_words(target)
         | _sensor_words(sensors, ports)
-        | _log_words(target, Sensor.CENTRE in sensors)
-        | {"MEMORY": memory_text(program), "KEEP_READINGS": keeping_text(program)}
+        | _log_words(second, Sensor.CENTRE in sensors)
+        | {"TITLE": _TITLES[target], "MEMORY": memory_text(program), "KEEP_READINGS": keeping_text(program)}
     )
     for name, word in words.items():
         text = text.replace(f"[[{name}]]", word)
@@ -219,7 +224,7 @@ def _hub_words(target: str) -> dict[str, str]:
     }
 
 
-def _log_words(target: str, with_light: bool) -> dict[str, str]:
+def _log_words(second: bool, with_light: bool) -> dict[str, str]:
     """Return how the log is written: names as `gecar.reality.recordings.columns` has them."""
     light = ['"reflection_pct"'] if with_light else []
     columns = [
@@ -236,9 +241,8 @@ def _log_words(target: str, with_light: bool) -> dict[str, str]:
     )
     words = {"COLUMNS": ", ".join(columns) + ","}
     remark = '"# white, black: " + str(calibration)'
-    if target == "pybricks2":
+    if second:
         return words | {
-            "TITLE": "Drives a LEGO EV3 with EV3 MicroPython 2.0 (Pybricks).",
             "HOW_TO_START": "Copy this folder to the brick (Visual Studio Code: F5) and start main.py.",
             "HOW_TO_GET_THE_LOG": "The run is in gecar_log_(date).csv on the brick: gecar import reads it.",
             "TOOLS": "DataLog, StopWatch, wait",
@@ -247,9 +251,6 @@ def _log_words(target: str, with_light: bool) -> dict[str, str]:
             "WRITE_ROW": f"log.log({values})",
         }
     return words | {
-        "TITLE": "Drives a LEGO SPIKE Prime or Robot Inventor hub with Pybricks 3 or newer."
-        if target == "spike"
-        else "Drives a LEGO EV3 with Pybricks 4.",
         "HOW_TO_START": "Open it in Pybricks Code and start it there, with the hub connected.",
         "HOW_TO_GET_THE_LOG": "The run is printed: copy the terminal's text into a file, which gecar import reads.",
         "TOOLS": "StopWatch, wait",
