@@ -1,4 +1,4 @@
-"""``gecar evolve``: evolve a program that drives the robot aaround a course."""
+"""``gecar evolve``: evolve a program that drives the robot around a course."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def evolve(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
-    """Evolve a program that drives the robot aaround a course.
+    """Evolve a program that drives the robot around a course.
 
     [bold]Examples[/]
 
