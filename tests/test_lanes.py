@@ -9,7 +9,7 @@ from gecar.language.mapping import Mapper
 from gecar.language.program import parse_program
 from gecar.world.course.course import load_course
 from gecar.world.effects import CATALOGUE
-from gecar.world.kernel.conditions import joined, select
+from gecar.world.kernel.conditions import impatient, joined, select
 from gecar.world.kernel.lanes import LANES
 from gecar.world.perturbation import drawn_conditions, under_drawn_conditions
 from gecar.world.robot import load_robot
@@ -96,3 +96,22 @@ def test_drives_under_drawn_conditions_keep_their_traces():
     drives = under_drawn_conditions(WORLD, opcodes, 3, 1)
     assert {drive.outcome for drive in drives} == {Outcome.OFF_COURSE}
     assert len({round(float(drive.trace["x_m"][-1]), 6) for drive in drives}) == 3
+
+
+def test_drives_given_up_end_alike_in_lanes_and_alone():
+    world = World(EV3, PAPER)
+    under = impatient(joined([world.nominal, drawn_conditions(world, LANES, 5)]))
+    programs = random_programs(40, seed=4)
+    pairs = [(p, row) for p in range(40) for row in range(len(under))]
+    assert_same(world, programs, under, pairs, np.arange(len(pairs)))
+
+
+def test_a_drive_is_given_up_a_third_of_the_time_limit_after_its_last_new_tile():
+    world = World(EV3, PAPER, time_limit_s=12.0)
+    program = parse_program("motor(80, 80, 1000) motor(0, 0, 60000)")
+    pairs = [(0, 0)]
+    (patient,), _ = Fleet(world).drive([program.opcodes], world.nominal, pairs, [0])
+    (summary,), (arrival,) = Fleet(world).drive([program.opcodes], impatient(world.nominal), pairs, [0])
+    assert patient["time_s"] == 12.0
+    assert summary["outcome"] == Outcome.OUT_OF_TIME
+    assert summary["time_s"] == pytest.approx(np.nanmax(arrival) + 4.0)

@@ -33,19 +33,9 @@ MARGIN = 1.05
 STEPS_S = (0.004, 0.002, 0.001, 0.0005, 0.00025)
 """Steps a result is checked at [s]."""
 CHOICE_STEPS_S = (
-    0.0042,
-    0.0036,
-    0.003,
-    0.0024,
-    0.0016,
-    0.0014,
-    0.0012,
-    0.0008,
-    0.0007,
-    0.0006,
-    0.0004,
-    0.0003,
-)
+    0.0042, 0.0041, 0.0039, 0.0038, 0.0036, 0.0034, 0.0032, 0.003, 0.0028, 0.0026, 0.0024, 0.0022,
+    0.0018, 0.0016, 0.0014, 0.0012, 0.0011, 0.0009, 0.0008, 0.0007, 0.0006, 0.0004, 0.0003,
+)  # fmt: skip
 """Steps the programs that a result is chosen from are driven at [s]."""
 AS_GOOD = 1.01
 """How much slower a shorter program may be to be chosen before the best: lexicographic parsimony in buckets (Luke and

@@ -16,7 +16,7 @@ from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.parallel.pickled import Pickled, unpickled
 from gecar.search.chance import FIRST_DRAWS, MARGIN, n_times, pool
 from gecar.search.fitness import score_type
-from gecar.world.kernel.conditions import Conditions
+from gecar.world.kernel.conditions import Conditions, impatient
 from gecar.world.perturbation import drawn_conditions, drawn_steps_s
 from gecar.world.rollout import Fleet, Outcome, World, goal_times
 
@@ -30,6 +30,9 @@ same score with the same seed, merit to beat and generation, whichever other pro
 @dataclass(frozen=True)
 class DriveEvaluator:
     """Scores programs by driving them: once, eq. 1; and under drawn conditions, if there are to be any.
+
+    A drive that reaches no further tile of the course's sequence for a third of the time limit is given up: it would
+    miss GOAL in nearly every case, and most of the time of a search's failures is spent so.
 
     Racing: what misses GOAL in the nominal drive ends there. The others meet `FIRST_DRAWS` drawn conditions; what still
     may arrive often enough, and is not `MARGIN` behind the best, meets the rest. So a bad program costs one drive.
@@ -97,7 +100,7 @@ class DriveEvaluator:
         generation: int,
     ) -> None:
         """Drive what may still be good under the generation's conditions, in two stages."""
-        under = drawn_conditions(self.world, self.draws - 1, (self.seed, generation))
+        under = impatient(drawn_conditions(self.world, self.draws - 1, (self.seed, generation)))
         first = min(FIRST_DRAWS, self.draws - 1)
         allowed = math.floor((1.0 - self.required_share) * self.draws + 1e-9)
         for begin, end in ((0, first), (first, self.draws - 1)):
@@ -108,8 +111,10 @@ class DriveEvaluator:
             left = np.flatnonzero(
                 (scores["fitness_s"] < UNSOLVED) & (missed <= allowed) & ~(behind & (begin > 0))
             )
-            if end <= begin or len(left) == 0:
+            if len(left) == 0:
                 return
+            if end == begin:
+                break
             k, row = _pairs(left, np.arange(begin, end))
             drive_number = generation * self.draws + row + 1
             streams = np.array(seeds, np.uint64)[k] + drive_number.astype(np.uint64) * _NEXT_STREAM
@@ -125,11 +130,8 @@ class DriveEvaluator:
         seeds: Sequence[int],
         generation: int,
     ) -> None:
-        """Drive the nominal robot at the generation's steps by what came through both stages of the race.
-
-        Up to `FIRST_DRAWS` + 1 draws there is one stage, and no such drive.
-        """
-        under = self.world.at_steps(drawn_steps_s((self.seed, generation)))
+        """Drive the nominal robot at the generation's steps by what came through the race."""
+        under = impatient(self.world.at_steps(drawn_steps_s((self.seed, generation))))
         k, row = _pairs(left, np.arange(len(under)))
         times = self._driven(scores, programs, k, under, row, np.array(seeds, np.uint64)[k])
         np.maximum.at(scores["slowest_s"], k, times)
@@ -164,7 +166,7 @@ class DriveEvaluator:
 
     @cached_property
     def _world_says(self) -> Conditions:
-        return self.world.nominal
+        return impatient(self.world.nominal)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle without what can be made again: a course without its raster is 2 kB instead of 3 MB."""

@@ -215,6 +215,7 @@ class Driver:
             under.start[0],
             float(under.phase_ms[0]),
             int(under.limit[0]),
+            int(under.patience[0]),
             world.floor,
             np.zeros(1, STATE),
             np.zeros(1, CONTROL),

@@ -25,8 +25,8 @@ class Conditions(NamedTuple):
         Pose of the axle's centre [m, m, rad], shape (n, 3).
     phase_ms
         When the program begins [ms].
-    limit
-        Steps until the time is out.
+    limit, patience
+        Steps until the time is out, and until a drive that reaches no further tile of the sequence is given up.
     sensor_noise_pct, motor_noise
         Standard deviations of a reading [%], and of a command as a share of it.
     statement_ms
@@ -39,6 +39,7 @@ class Conditions(NamedTuple):
     start: npt.NDArray[np.float64]
     phase_ms: npt.NDArray[np.float64]
     limit: npt.NDArray[np.int64]
+    patience: npt.NDArray[np.int64]
     sensor_noise_pct: npt.NDArray[np.float64]
     motor_noise: npt.NDArray[np.float64]
     statement_ms: npt.NDArray[np.float64]
@@ -77,13 +78,15 @@ def conditions(
     def each(value: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return np.broadcast_to(np.asarray(value, float), n).copy()
 
+    limit = np.rint(time_limit_s / steps).astype(np.int64)
     return Conditions(
         np.ascontiguousarray(physics),
         derived,
         is_plain(physics),
         np.broadcast_to(np.asarray(start, float), (n, 3)).copy(),
         each(phase_ms),
-        np.rint(time_limit_s / steps).astype(np.int64),
+        limit,
+        limit,
         each(sensor_noise_pct),
         each(motor_noise),
         each(statement_ms),
@@ -94,6 +97,12 @@ def select(under: Conditions, rows: Sequence[int] | slice) -> Conditions:
     """Return some rows."""
     columns: list[Any] = [column[rows] for column in under]
     return Conditions(*columns)
+
+
+def impatient(under: Conditions) -> Conditions:
+    """Return conditions under which a drive that reaches no further tile for a third of the time limit is given up."""
+    columns = dict(zip(Conditions._fields, under, strict=True))
+    return Conditions(**{**columns, "patience": under.limit // 3})
 
 
 def joined(several: Sequence[Conditions]) -> Conditions:

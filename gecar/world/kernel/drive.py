@@ -28,8 +28,8 @@ class Setup(NamedTuple):
         Of dtypes `PHYSICS` and `DERIVED`, shape (1,).
     start
         Pose of the axle's centre [m, m, rad], shape (3,).
-    phase_ms, limit
-        When the program begins [ms]; steps until the time is out.
+    phase_ms, limit, patience
+        When the program begins [ms]; steps until the time is out, and until a drive without a further tile is given up.
     floor
         The course.
     state, control, eyes
@@ -47,6 +47,7 @@ class Setup(NamedTuple):
     start: npt.NDArray[np.float64]
     phase_ms: float
     limit: int
+    patience: int
     floor: Floor
     state: npt.NDArray[Any]
     control: npt.NDArray[Any]
@@ -190,10 +191,13 @@ def _drive_kernel(terms: bool) -> Any:  # noqa: C901
             place(s, p, setup.start[0], setup.start[1], setup.start[2])
             begin_program(k, setup.phase_ms, c.dt, s, p, floor)
         remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
+        reached = int(np.rint(arrival[passed - 1] / c.dt)) if passed > 0 else 0
         for n in range(first, last):
             k.step = n
+            before = passed
             outcome, passed = enter_tile(n, s, p, c, k, floor, passed, arrival)
-            if outcome == RUNNING and n >= setup.limit:
+            reached = n if passed > before else reached
+            if outcome == RUNNING and n >= min(setup.limit, reached + setup.patience):
                 outcome = OUT_OF_TIME
             if outcome == RUNNING:
                 if remembers:

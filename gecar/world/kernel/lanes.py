@@ -90,6 +90,7 @@ class Memory(NamedTuple):
     commands: npt.NDArray[np.float64]
     job: npt.NDArray[np.int64]
     passed: npt.NDArray[np.int32]
+    limit: npt.NDArray[np.int64]
 
 
 def make_memory() -> Memory:
@@ -101,6 +102,7 @@ def make_memory() -> Memory:
         np.zeros(LANES * 2 * RING),
         np.full(LANES, -1, np.int64),
         np.zeros(LANES, np.int32),
+        np.zeros(LANES, np.int64),
     )
 
 
@@ -196,6 +198,7 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
     m.job[lane] = waiting
     m.passed[lane] = 0
     condition = jobs.condition[waiting]
+    m.limit[lane] = min(under.limit[condition], under.patience[condition])
     p = under.physics[condition]
     store_physics(m.flat, LANES, lane, p)
     store_derived(m.flat, LANES, lane, under.derived[condition])
@@ -242,8 +245,12 @@ def _attend(lane: int, jobs: Jobs, under: Conditions, floor: Floor, m: Memory, e
     control = m.control[lane]
     n = int(k.step)
     control.step = n
-    limit = under.limit[jobs.condition[job]]
-    outcome, m.passed[lane] = enter_tile(n, s, p, c, control, floor, m.passed[lane], ends.arrival_s[job])
+    before = m.passed[lane]
+    outcome, m.passed[lane] = enter_tile(n, s, p, c, control, floor, before, ends.arrival_s[job])
+    if m.passed[lane] > before:
+        condition = jobs.condition[job]
+        m.limit[lane] = min(under.limit[condition], n + under.patience[condition])
+    limit = m.limit[lane]
     if outcome == RUNNING and n >= limit:
         outcome = OUT_OF_TIME
     if outcome == RUNNING and (n >= control.due_step or control.until >= 0):
