@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from gecar.random_streams import normal_bound, normal_quantile
 from gecar.reality.replay.reflectance import readings_along
 from gecar.world.course.course import load_course
 from gecar.world.kernel.sensing import (
@@ -150,3 +151,9 @@ def test_delay_is_linear_between_steps():
     rings = np.arange(2 * RING, dtype=float)
     assert delayed(rings, RING, 100, 2.25) == RING + 97.75
     assert delayed(rings, RING, 100, 0.0) == RING + 100
+
+
+def test_normal_numbers_stay_within_their_bounds():
+    for u in (2.0**-54, 1e-6, 0.0007, 0.00071, 0.3, 0.5, 0.7, 0.9992, 0.9994, 1.0 - 2.0**-53):
+        z, most = normal_quantile(u), normal_bound(u)
+        assert min(most, 0.0) <= z <= max(most, 0.0)

@@ -262,7 +262,8 @@ class Driver:
         )
 
     def reset(self) -> None:
-        """Reset robot and obstacles to where the course has them."""
+        """Reset robot and obstacles to where the course has them, and the sensors' memory."""
+        self.setup.eyes["asked"] = -1
         if self.world.uses_pymunk:
             x, y, heading = self.setup.start
             self._engine, self.obstacles = build_engine(self.world.robot, self.world.course, x, y, heading)

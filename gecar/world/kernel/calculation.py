@@ -86,15 +86,13 @@ def calculate(  # noqa: C901, PLR0912
     What a DRIVE takes is then at the beginning of the stack.
     """
     stack, top = k.stack, 0
-    seen, level = -1, 0.0
     while row < program.shape[0]:
         op, a = program[row, 0], program[row, 1]
         if op < CONSTANT or op > REMEMBER:
             break
         row += 1
         if op in (READING, REMEMBER):
-            if a != seen:  # a sensor asked twice in one moment only draws its noise twice
-                seen, level = a, reflection(a, k.step, s, p, dt, floor, eyes)
+            level = reflection(a, k.step, s, p, dt, floor, eyes)
             noise = eyes.noise_pct * normal(eyes) if eyes.noise_pct > 0.0 else 0.0
             reading = int(reported(level, noise, p)) * ONE
             if op == READING:

@@ -42,11 +42,14 @@ class Floor(NamedTuple):
 
 
 # Memory of the colour sensors: lagged reflections [%] of the last steps, for centre, left and right sensor; which of
-# them the program reads; deviations of a reading [%] and a command; time of a statement [ms]; the random stream.
+# them the program reads; when each was last asked and what it saw then [%]; deviations of a reading [%] and a command;
+# time of a statement [ms]; the random stream.
 EYES = np.dtype(
     [
         ("rings", np.float64, (3 * RING,)),
         ("used", np.int8, (3,)),
+        ("asked", np.int64, (3,)),
+        ("level", np.float64, (3,)),
         ("noise_pct", np.float64),
         ("motor_noise", np.float64),
         ("statement_ms", np.float64),
@@ -86,7 +89,12 @@ def look(n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> None:
 
 @kernel
 def reflection(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eyes: Any) -> float:
-    """Return the reflection [%] that a sensor reports on at step ``n``: lagged and late, without noise."""
+    """Return the reflection [%] that a sensor reports on at step ``n``: lagged and late, without noise.
+
+    A sensor asked several times in one step looks once.
+    """
+    if eyes.asked[sensor] == n:
+        return eyes.level[sensor]
     if p.sensor_lag == 0.0 and p.sensor_delay == 0.0:
         level = see(sensor, s, p, floor)
     else:
@@ -96,6 +104,7 @@ def reflection(sensor: int, n: int, s: Any, p: Any, dt: float, floor: Floor, eye
         level += (
             colour_error(s.t, x, y, s.heading, p.sensor_gain * level + p.sensor_offset, p) / p.sensor_gain
         )
+    eyes.asked[sensor], eyes.level[sensor] = n, level
     return level
 
 

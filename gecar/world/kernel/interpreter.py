@@ -24,7 +24,7 @@ from gecar.language.opcodes import (
     STACK,
     TEST,
 )
-from gecar.random_streams import LARGEST_NORMAL, normal, skip_normal
+from gecar.random_streams import normal, normal_bound, normal_quantile, uniform
 from gecar.world.kernel.calculation import calculate, holds
 from gecar.world.kernel.eyes import Floor, reflection
 from gecar.world.kernel.sensing import reported
@@ -45,17 +45,17 @@ CONTROL = np.dtype(
 def test_row(
     program: npt.NDArray[np.int32], row: int, k: Any, s: Any, p: Any, dt: float, floor: Floor, eyes: Any
 ) -> bool:
-    """Whether the test in a row holds now; as a reading compares, but noise that cannot matter is only skipped."""
-    comparison, threshold = program[row, 2], program[row, 3] / 1000.0
+    """Whether the test in a row holds now, as a reading compares; noise is worked out only where it may matter."""
+    comparison, threshold = program[row, 2], program[row, 3]
     level = reflection(program[row, 1], k.step, s, p, dt, floor, eyes)
-    most = LARGEST_NORMAL * eyes.noise_pct
-    answer = holds(reported(level, most, p), comparison, threshold)
+    answer = holds(ONE * reported(level, 0.0, p), comparison, threshold)
     if eyes.noise_pct == 0.0:
         return answer
-    if comparison < EQUAL and answer == holds(reported(level, -most, p), comparison, threshold):
-        skip_normal(eyes)
+    u = uniform(eyes)
+    most = eyes.noise_pct * normal_bound(u)
+    if comparison < EQUAL and answer == holds(ONE * reported(level, most, p), comparison, threshold):
         return answer
-    return holds(reported(level, eyes.noise_pct * normal(eyes), p), comparison, threshold)
+    return holds(ONE * reported(level, eyes.noise_pct * normal_quantile(u), p), comparison, threshold)
 
 
 @kernel
@@ -110,26 +110,36 @@ def run_program(  # noqa: C901
     """
     if not _goes_on(program, k, s, p, dt, floor, eyes):
         return True
-    passes = 1 if k.row == 0 else 0
+    row, rows = k.row, program.shape[0]  # kept in registers: polling is most of a drive's time
+    surely_now_ms = 1000.0 * dt * (k.step - 0.001)
+    passes = 1 if row == 0 else 0
     while passes < 2:
-        if k.row >= program.shape[0]:
-            k.row = 0
+        if row >= rows:
+            row = 0
             passes += 1
-        elif program[k.row, 0] == TEST:
-            target = program[k.row, 4]
-            k.row = k.row + 1 if test_row(program, k.row, k, s, p, dt, floor, eyes) else target
-        elif program[k.row, 0] == JUMP:
-            k.row = program[k.row, 4]
-        elif CONSTANT <= program[k.row, 0] <= REMEMBER:
-            k.row = calculate(program, k.row, k, s, p, dt, floor, eyes)
-        elif program[k.row, 0] == LOOP:
-            if _turns_in_no_time(program, k):
+            continue
+        op = program[row, 0]
+        if op == TEST:
+            row = row + 1 if test_row(program, row, k, s, p, dt, floor, eyes) else program[row, 4]
+        elif op == JUMP:
+            row = program[row, 4]
+        elif op == LOOP:
+            k.row = row
+            again = _turns_in_no_time(program, k)
+            row = k.row
+            if again:
                 break
-        elif _command(program, k, eyes):
-            passes = 0
-            k.due_step = first_step_after(k.due_ms, dt)
-            if k.due_step > k.step:
-                return True
+        elif CONSTANT <= op <= REMEMBER:
+            row = calculate(program, row, k, s, p, dt, floor, eyes)
+        else:
+            k.row = row
+            takes_time = _command(program, k, eyes)
+            row = k.row
+            if takes_time:
+                passes = 0
+                if k.due_ms > surely_now_ms and _waits(k, dt):
+                    return True
+    k.row = row
     k.due_step = k.step + 1
     k.due_ms = 1000.0 * dt * k.due_step
     if passes < 2:
@@ -137,6 +147,13 @@ def run_program(  # noqa: C901
     stuck = _stands_for_ever(k, s, eyes)
     k.changed = 0
     return not stuck
+
+
+@kernel
+def _waits(k: Any, dt: float) -> bool:
+    """Set the step the program waits for; return whether that is yet to come."""
+    k.due_step = first_step_after(k.due_ms, dt)
+    return k.due_step > k.step
 
 
 @kernel

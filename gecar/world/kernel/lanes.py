@@ -215,6 +215,7 @@ def _take(lane: int, waiting: int, jobs: Jobs, under: Conditions, floor: Floor, 
     e = m.eyes[lane]
     for sensor in range(3):
         e.used[sensor] = jobs.used[jobs.program[waiting], sensor]
+        e.asked[sensor] = -1
     e.noise_pct = under.sensor_noise_pct[condition]
     e.motor_noise = under.motor_noise[condition]
     e.statement_ms = under.statement_ms[condition]
