@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from concealing import EV3, recorded
 
-from gecar.reality.advise.next_recording import LIBRARY, difference, suggest
+from gecar.reality.advise.next_recording import LEAST_DIFFERENCE, LIBRARY, difference, suggest
 from gecar.reality.materiality import Size
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.verdict import Found
+from gecar.reality.verdict import Found, Limit
 from gecar.world.robot import Robot
 
 
@@ -60,3 +60,20 @@ def test_motors_that_differ_are_told_apart_without_a_line(effect: str, value: fl
     label = "angle_deg" if effect == "backlash" else "time_s"
     differences = parted(seen_on("none"), EV3, with_effect(effect, label, value))
     assert max(differences.values()) > 10.0
+
+
+def test_what_these_recordings_say_nothing_of_is_asked_for() -> None:
+    unseen = {"backlash": None, "sensor_delay": None, "track_width": Limit(0.01, "1")}
+    suggested = suggest(EV3, (), [], LIKE, NOISE, unexplained=False, limits=unseen)
+    name, why = suggested.why.split(": ")
+    assert "backlash" in why
+    assert "track_width" not in why
+    assert parted(LIKE, EV3, with_effect("backlash", "angle_deg", 1.0))[name] >= LEAST_DIFFERENCE
+
+
+def test_the_recording_shows_the_effect_one_asks_about() -> None:
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
+    suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False, about="floor_tilt")
+    assert suggested.why.endswith("would show floor_tilt")
+    blind = suggest(EV3, (), [], seen_on("none"), NOISE, unexplained=False, about="sensor_lag")
+    assert "no sequence of the library shows sensor_lag with these sensors" in blind.why

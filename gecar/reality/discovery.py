@@ -79,6 +79,7 @@ class _Context:
     program: Program | None
     language: Grammar | None
     invents: bool
+    about: str
 
     def arrival_apart_s(self, one: Robot, other: Robot) -> float | None:
         """Return how much later or earlier one robot arrives with the program than another [s]; None: unknown."""
@@ -104,6 +105,7 @@ def discover(
     program: Program | None = None,
     language: Grammar | None = None,
     invents: bool = False,
+    about: str = "",
 ) -> Verdict:
     """Find which physics a simulation lacks, fit it, and judge it on recordings set aside.
 
@@ -133,6 +135,8 @@ def discover(
         The language of laws that are written where nothing in the catalogue explains what is left; default: none are.
     invents
         Whether laws are written in any case.
+    about
+        An effect that the next recording shall show; default: what helps most.
 
     Raises
     ------
@@ -151,6 +155,7 @@ def discover(
         program,
         language,
         invents,
+        about,
     )
     with Threads(workers) as threads:
         return _discover(case.name, context, threads)
@@ -179,6 +184,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     invented = tuple(law for stage in stages for law in stage.invented)
     word = _word(bool(effects), bool(invented), unexplained)
     where = _located(context, stages, fitted, found)
+    seen_from = _limits(context, stages)
     return Verdict(
         case=name,
         verdict=word,
@@ -188,9 +194,19 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
         residual=_what_is_left(context, stages, fitted, after),
-        next_recording=suggest(found, effects, rivals, split.fitted[0], noise, unexplained, invented),
+        next_recording=suggest(
+            found,
+            effects,
+            rivals,
+            split.fitted[0],
+            noise,
+            unexplained,
+            invented,
+            seen_from,
+            context.about,
+        ),
         robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
-        limits=_limits(context, stages),
+        limits=seen_from,
         fitted_on=tuple(r.name for r in split.fitted),
         notes=notes_on(
             split,

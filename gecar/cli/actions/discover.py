@@ -37,7 +37,7 @@ class Task:
     ----------
     case
         The recordings.
-    holdout, robot, seed, workers, with_formula, catalogue, material, program, language, invents
+    holdout, robot, seed, workers, with_formula, catalogue, material, program, language, invents, about
         As `gecar.reality.discovery.discover`.
     pictures
         Whether to draw.
@@ -55,6 +55,7 @@ class Task:
     program: Program | None
     language: Grammar | None
     invents: bool
+    about: str
 
 
 class Told(NamedTuple):
@@ -87,7 +88,7 @@ def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -
     verdict = discover(
         task.case, task.holdout, task.robot, task.seed, task.workers, tell, task.with_formula,
         catalogue=task.catalogue, material=task.material, program=task.program, language=task.language,
-        invents=task.invents,
+        invents=task.invents, about=task.about,
     )  # fmt: skip
     table = write(verdict, out)
     if task.pictures:

@@ -78,6 +78,11 @@ def discover(
         typer.Option("--without", metavar="EFFECTS", show_default=False,
                      help="Effects to leave out of the catalogue, separated by commas."),
     ] = "",
+    about: Annotated[
+        str,
+        typer.Option("--about", metavar="EFFECT", show_default="what helps most",
+                     help="Effect that the suggested next recording should show."),
+    ] = "",
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw pictures and report.html.")] = True,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
@@ -114,6 +119,7 @@ def discover(
     language = None if invent is False else physics_grammar(physics)
     driven = read_program(find_program(program)[0]) if program is not None else None
     line = Material(material)
+    effects_named(about, "--about")
     tasks = {
         folder: Task(
             read_case(case),
@@ -128,6 +134,7 @@ def discover(
             driven,
             language,
             bool(invent),
+            about,
         )
         for folder, case in folders(out, cases).items()
     }
@@ -143,7 +150,7 @@ def discover(
     output.print_json(told.table)
 
 
-def effects_named(names: str) -> list[str]:
+def effects_named(names: str, option: str = "--without") -> list[str]:
     """Return the effects of a list with commas between.
 
     Raises
@@ -156,7 +163,7 @@ def effects_named(names: str) -> list[str]:
     found = [name.strip() for name in names.split(",") if name.strip()]
     for name in found:
         if name not in BY_ID:
-            raise expected("--without", f"'{name}'", f"an effect of the catalogue: {', '.join(BY_ID)}")
+            raise expected(option, f"'{name}'", f"an effect of the catalogue: {', '.join(BY_ID)}")
     return found
 
 

@@ -1,23 +1,25 @@
 """The recording to make next: from a library of command sequences a robot can drive, the most informative one.
 
-Each is driven by the robot as found and by its rival, the robot with the confused effect exchanged or with a parameter
-at the end of its interval; chosen is the sequence in which their sensors differ most, in standard deviations.
+Each is driven by the robot as found and by its rival: the robot with the confused effect exchanged, with a parameter at
+the end of its interval, or with an effect of which the recordings say nothing. Chosen is the sequence in which their
+sensors differ most, in standard deviations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.verdict import Found, Invented, NextRecording
+from gecar.reality.verdict import Found, Invented, Limit, NextRecording
 from gecar.world.course.course import Course, load_course
 from gecar.world.robot import Robot
 from gecar.world.terms import Term
@@ -60,8 +62,13 @@ def suggest(
     noise: Noise,
     unexplained: bool,
     laws: Sequence[Invented] = (),
+    limits: Mapping[str, Limit | None] | None = None,
+    about: str = "",
 ) -> NextRecording:
     """Return what to record next, and why.
+
+    In this order: what shows the effect asked for; what distinguishes confused effects, or laws; what unexplained error
+    depends on; what narrows an interval; what shows most of the effects of which these recordings say nothing.
 
     Parameters
     ----------
@@ -79,27 +86,61 @@ def suggest(
         Whether something is left that nothing explains.
     laws
         Those that were written, parts of ``robot``.
+    limits
+        The smallest size of other effects that would have been seen; None: of them the recordings say nothing.
+    about
+        An effect to ask about; default: none in particular.
     """
+    unseen = [about] if about else [effect for effect, limit in (limits or {}).items() if limit is None]
+    if about or (unseen and not (rivals or laws or unexplained or found)):
+        return _about_unseen(robot, unseen, like, noise)
     if rivals:
-        confused = next(f for f in found if f.alternatives)
-        others = " and ".join(confused.alternatives)
-        name, apart = _telling(robot, rivals[0], like, noise)
-        if apart < LEAST_DIFFERENCE:
-            words = f"{name}: no sequence of the library distinguishes {confused.id} from {others} with these sensors"
-            return NextRecording(words, LIBRARY[name])
-        return NextRecording(f"{name}: distinguishes {confused.id} from {others}", LIBRARY[name])
+        return _about_confused(robot, next(f for f in found if f.alternatives), rivals[0], like, noise)
     if laws:
         return _about_laws(robot, laws, like, noise)
-    if unexplained:
-        name = "long and slow, then long and fast"
-        return NextRecording(
-            f"{name}: shows whether the residual depends on speed, distance or time", LIBRARY[name]
-        )
     if found:
         name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
-        return NextRecording(f"{name}: narrows the interval of {found[0].id} further", LIBRARY[name])
-    words = "reversals: nothing is missing so far; this stresses gears, friction and grip most"
-    return NextRecording(words, LIBRARY["reversals"])
+        why = f"narrows the interval of {found[0].id} further"
+    else:
+        name, why = "reversals", "nothing is missing so far; this stresses gears, friction and grip most"
+    if unexplained:
+        name = "long and slow, then long and fast"
+        why = "shows whether the residual depends on speed, distance or time"
+    return NextRecording(f"{name}: {why}", LIBRARY[name])
+
+
+def _about_confused(robot: Robot, found: Found, rival: Robot, like: Recording, noise: Noise) -> NextRecording:
+    """Return what distinguishes an effect from its alternatives."""
+    name, apart = _telling(robot, rival, like, noise)
+    told = "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
+    return NextRecording(f"{name}: {told} {found.id} from {_listed(found.alternatives)}", LIBRARY[name])
+
+
+def _about_unseen(robot: Robot, effects: Sequence[str], like: Recording, noise: Noise) -> NextRecording:
+    """Return the sequence that shows most of some effects, each of a size worth a name."""
+    rivals = {effect: _with_effect(robot, effect) for effect in effects}
+    shown = {
+        name: [e for e in effects if difference(commands, robot, rivals[e], like, noise) >= LEAST_DIFFERENCE]
+        for name, commands in LIBRARY.items()
+    }
+    best = max(shown, key=lambda name: len(shown[name]))
+    if shown[best]:
+        return NextRecording(f"{best}: would show {_listed(shown[best])}", LIBRARY[best])
+    words = f"{best}: no sequence of the library shows {_listed(effects)} with these sensors"
+    return NextRecording(words, LIBRARY[best])
+
+
+def _listed(effects: Sequence[str]) -> str:
+    *others, last = effects
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _with_effect(robot: Robot, effect: str) -> Robot:
+    """Return a robot with one more effect, of a size worth a name."""
+    parameters = free(robot, [effect])
+    z = parameters.vector({})
+    z[0] = 1.0 if parameters.bounds[1][0] >= 1.0 else -1.0
+    return robot.with_effects(parameters.values(z))
 
 
 def _at_interval_end(robot: Robot, found: Found) -> Robot:
