@@ -23,6 +23,14 @@ def test_new_writes_a_course_to_begin_with(gecar, tmp_path):
     assert "exists" in gecar.error("course", "new", "mine/zig_zag.toml")
 
 
+def test_a_random_course_is_written_and_named(gecar, tmp_path):
+    assert gecar("course", "new", "mine.toml", "--random", "--seed", "7", "--size", "6x9").code == 0
+    shown = gecar("course", "show", "mine.toml", "--json").json
+    assert shown["columns"] <= 6
+    assert shown["title"] == "Random course 7"
+    assert gecar("course", "show", "random:7", "--picture", "7.png").code == 0
+
+
 def test_print_writes_a_pdf(gecar, tmp_path):
     ended = gecar("course", "print", "paper", "--paper", "sheet", "--json")
     assert ended.json["sheets"] == 1
@@ -40,6 +48,9 @@ def test_print_writes_a_pdf(gecar, tmp_path):
         (("new", "mine.toml", "--size", "big"), "big"),
         (("new", "mine.toml", "--size", "1x1"), "--size"),
         (("new", "mine.toml", "--tile", "nan"), "nan"),
+        (("new", "mine.toml", "--seed", "1"), "--random"),
+        (("new", "mine.toml", "--random", "--tiles", "2"), "3 to 24"),
+        (("new", "mine.toml", "--random", "--turns", "nan"), "0 to 1"),
         (("list", "--robot", "nobody"), "nobody"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 from shapely.geometry import Point
 
 from courses import make_course
-from gecar.world.course.course import COURSES, list_courses, load_course
+from gecar.world.course.course import COURSES, list_courses, load_course, random_course
 from gecar.world.course.line import strokes
 from gecar.world.robot import load_robot
 
@@ -101,3 +101,31 @@ def test_a_course_goes_to_worker_processes_whole():
     again = pickle.loads(pickle.dumps(course))
     assert np.array_equal(again.raster(), course.raster())
     assert again.obstacles == course.obstacles
+
+
+def test_random_courses_are_whole_and_differ():
+    maps = set()
+    for seed in range(60):
+        course = random_course(seed)
+        assert 12 <= len(course.sequence) + 1 <= 22
+        assert (
+            len(set(course.sequence.tolist()))
+            == len(course.sequence)
+            == np.count_nonzero(course.drivable) - 1
+        )
+        assert course.length_m > 0
+        assert max(course.columns / 8, course.rows / 6) <= 1
+        maps.add(course.layout.characters)
+    assert len(maps) == 60
+
+
+def test_a_random_course_is_the_same_for_the_same_seed_and_as_long_and_winding_as_asked():
+    assert random_course(3).layout == load_course("random:3").layout
+    straight, winding = random_course(3, 20, 0.1), random_course(3, 20, 0.9)
+    assert len(straight.sequence) == len(winding.sequence) == 19
+    corners = [
+        sum(course.layout.tile(k).kind.endswith("corner") for k in course.sequence)
+        for course in (straight, winding)
+    ]
+    assert corners[0] < 6 < corners[1]
+    assert random_course(3, tile_size_m=0.5).tile_size_m == 0.5

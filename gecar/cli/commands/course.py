@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from gecar.world.course.course import Course
     from gecar.world.robot import Robot
 
+RANDOM = "A random course"
+
 course = typer.Typer(
     name="course",
     help="List, show, print and make courses.",
@@ -160,30 +162,75 @@ def new(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="File to write, NAME.toml.", show_default=False)
     ],
-    size: Annotated[str, typer.Option("--size", metavar="COLUMNSxROWS", help="Number of tiles.")] = "8x4",
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size", metavar="COLUMNSxROWS", help="Number of tiles.", show_default="8x4; random: at most 8x6"
+        ),
+    ] = None,
     tile: Annotated[
-        float, typer.Option("--tile", metavar="M", help="Edge length of a tile, in metres.")
-    ] = 0.30,
+        float | None,
+        typer.Option(
+            "--tile", metavar="M", help="Edge length of a tile, in metres.", show_default="0.3; random: drawn"
+        ),
+    ] = None,
+    at_random: Annotated[
+        bool, typer.Option("--random", help="A random course instead of a template.", rich_help_panel=RANDOM)
+    ] = False,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Random seed.", show_default="1", rich_help_panel=RANDOM)
+    ] = None,
+    tiles: Annotated[
+        int | None,
+        typer.Option(
+            "--tiles", help="Length of the line in tiles.", show_default="drawn", rich_help_panel=RANDOM
+        ),
+    ] = None,
+    turns: Annotated[
+        float | None,
+        typer.Option(
+            "--turns",
+            metavar="SHARE",
+            help="Share of the tiles in which the line turns.",
+            show_default="drawn",
+            rich_help_panel=RANDOM,
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a template for a course: a loop, with every field explained.
+    """Write a template for a course: a loop, with every field explained; or a random course.
 
-    [bold]Example[/]
+    [bold]Examples[/]
 
       gecar course new mine.toml --size 6x4
-    """
+      gecar course new random_7.toml --random --seed 7 --turns 0.5
+    """  # fmt: skip
     from gecar.calling import command
-    from gecar.world.course.new_course import new_course
+    from gecar.world.course.new_course import new_course, write_course
+    from gecar.world.course.random_course import MOST_COLUMNS, MOST_ROWS, random_text
+    from gecar.world.course.schema import TILE_SIZE_M
 
     output = Output(as_json)
+    for option, value in (("--seed", seed), ("--tiles", tiles), ("--turns", turns)):
+        if value is not None and not at_random:
+            raise expected("course new", f"{option} without --random", "both, or neither")
+    if at_random:
+        field = (MOST_COLUMNS, MOST_ROWS) if size is None else _tiles(size)
+        write_course(file, random_text(1 if seed is None else seed, tiles, turns, tile, field))
+        advice = "Look at it"
+    else:
+        new_course(file, *_tiles(size or "8x4"), TILE_SIZE_M if tile is None else tile)
+        advice = "Edit its map, then"
+    output.print(f"Wrote {file}. {advice}: {command()} course show {file} --picture {file.stem}.png")
+    output.print_json({"file": str(file)})
+
+
+def _tiles(size: str) -> tuple[int, int]:
+    """Read COLUMNSxROWS."""
     columns, _, rows = size.lower().partition("x")
     if not (columns.isdecimal() and rows.isdecimal()):
         raise expected("--size", f"'{size}'", "tiles across x tiles up, as 8x4")
-    new_course(file, int(columns), int(rows), tile)
-    output.print(
-        f"Wrote {file}. Edit its map, then: {command()} course show {file} --picture {file.stem}.png"
-    )
-    output.print_json({"file": str(file)})
+    return int(columns), int(rows)
 
 
 def facts(loaded: Course, robot: Robot) -> dict[str, Any]:

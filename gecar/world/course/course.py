@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,15 +22,26 @@ from gecar.world.course.layout import Layout, Pose
 from gecar.world.course.lower_bound.fastest_time import fastest_time
 from gecar.world.course.lower_bound.shortest_way import ShortestWay, shortest_way
 from gecar.world.course.obstacle import Obstacle
+from gecar.world.course.random_course import random_text
 from gecar.world.course.raster import PITCH_M, WHITE, FloorImage
 from gecar.world.course.schema import validate
 from gecar.world.kernel.sensing import spot_average
 from gecar.world.robot import Robot
 
-__all__ = ["COURSES", "Course", "Obstacle", "Pose", "list_courses", "load_course", "parse_course"]
+__all__ = [
+    "COURSES",
+    "Course",
+    "Obstacle",
+    "Pose",
+    "list_courses",
+    "load_course",
+    "parse_course",
+    "random_course",
+]
 
 COURSES = shipped("courses")
 _LARGEST_FILE = 1_000_000
+_RANDOM = re.compile(r"random:(\d{1,18})")
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,21 +211,31 @@ def list_courses() -> list[str]:
 
 
 def load_course(name_or_path: str | Path) -> Course:
-    """Load a course by file, or by the name of one that ships with gecar.
+    """Load a course by file, or by the name of one that ships with gecar; ``random:7`` is `random_course` 7.
 
     Raises
     ------
     InputError
         If there is no such course, or its file is wrong; one line that names the field.
     """
+    seed = _RANDOM.fullmatch(str(name_or_path))
+    if seed:
+        return random_course(int(seed[1]))
     path = Path(name_or_path)
     if path.suffix != ".toml" and not is_file(path):
         if str(name_or_path) not in list_courses():
-            raise one_of("--course", str(name_or_path), list_courses(), "a course file (.toml)")
+            raise one_of("--course", str(name_or_path), list_courses(), "a course file (.toml), random:SEED")
         path = COURSES / f"{name_or_path}.toml"
     if is_file(path) and path.stat().st_size > _LARGEST_FILE:
         raise expected(path, f"{path.stat().st_size} bytes", f"a course file of at most {_LARGEST_FILE}")
     return parse_course(read_text(path, "a course file"), str(path))
+
+
+def random_course(
+    seed: int, tiles: int | None = None, turns: float | None = None, tile_size_m: float | None = None
+) -> Course:
+    """Return a random course; see `gecar.world.course.random_course.random_text`."""
+    return parse_course(random_text(seed, tiles, turns, tile_size_m), f"random:{seed}")
 
 
 def parse_course(text: str, source: str = "<course>") -> Course:

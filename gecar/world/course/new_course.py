@@ -76,15 +76,25 @@ def new_course(path: Path, columns: int = 8, rows: int = 4, tile_size_m: float =
     InputError
         If the file exists or cannot be written, or the course would be too small or too large.
     """
-    if path.suffix != ".toml":
-        raise expected(path, f"a name ending in '{path.suffix}'", "a course file's name, ending in .toml")
-    if path.exists():
-        raise expected(path, "a file that exists", "a new name")
     if columns < 2 or rows < 3:
         raise expected("--size", f"{columns} x {rows} tiles", "at least 2 x 3")
     if columns * rows > MAX_TILES:
         raise expected("--size", f"{columns} x {rows} tiles", f"at most {MAX_TILES} tiles")
-    text = _filled(path, columns, rows, tile_size_m)
+    write_course(path, _filled(path, columns, rows, tile_size_m))
+
+
+def write_course(path: Path, text: str) -> None:
+    """Write a course's text to a new file.
+
+    Raises
+    ------
+    InputError
+        If the file exists or cannot be written, its name does not end in .toml, or the course has a fault.
+    """
+    if path.suffix != ".toml":
+        raise expected(path, f"a name ending in '{path.suffix}'", "a course file's name, ending in .toml")
+    if path.exists():
+        raise expected(path, "a file that exists", "a new name")
     parse_course(text, str(path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
