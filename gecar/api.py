@@ -141,7 +141,7 @@ def evolve(
     Parameters
     ----------
     course, grammar, robot
-        Names, files, or objects.
+        Names, files, or objects; several courses are named as ``"paper+hairpin"`` or ``"random:1-20"``.
     fitness
         Fitness of a drive, by default its time to GOAL (eq. 1): a function of a `gecar.world.rollout.Drive` with its
         trace that returns 0 or more. Lower is better; 10,000 or more, or nan, is a failed drive. Drives are then
@@ -183,6 +183,8 @@ def evolve(
     if out is not None:
         return _evolve_into(Path(out), config, objects, fitness, tell)
     task = _task(config, **objects)
+    if fitness is not None and task.others:
+        raise expected("course", f"{config.course}", "one course, with a fitness of your own")
     evolution = task.evolution()
     if fitness is None:
         search(task, evolution, tell)
@@ -300,7 +302,8 @@ def _task(
         check_robot_language(grammar)
         task = replace(task, mapper=Mapper(grammar, task.mapper.options))
     world = replace(task.world, course=course or task.world.course, robot=robot or task.world.robot)
-    return replace(task, world=world)
+    others = tuple(replace(other, robot=world.robot) for other in task.others)
+    return replace(task, world=world, others=others)
 
 
 def _evolve_into(

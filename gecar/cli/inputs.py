@@ -10,7 +10,7 @@ from gecar.errors import expected
 from gecar.language.program import Program
 from gecar.results.config import Config, configure, read_config
 from gecar.search.programs import noise_seed
-from gecar.world.course.course import load_course
+from gecar.world.course.course import course_names, load_course
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Noise, World
 
@@ -22,6 +22,8 @@ _OF_A_WORLD = ("course", "robot", "time_limit_s", "step_s", "engine", "noise", "
 
 def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
     """Find a program's file, and the settings of the run it comes from if it lies in a run's folder.
+
+    Of a run on several courses they name the first, that of eq. 1.
 
     Raises
     ------
@@ -35,7 +37,8 @@ def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
     if file.name != "best.txt" or not beside.is_file():
         return file, {}
     config = read_run_config(file.parent)
-    return file, {name: getattr(config, name) for name in _OF_A_WORLD}
+    settings = {name: getattr(config, name) for name in _OF_A_WORLD}
+    return file, settings | {"course": course_names(config.course)[0]}
 
 
 def read_run_config(folder: Path) -> Config:

@@ -13,7 +13,8 @@ WORLD, RUN = "World", "Run"
 
 CourseOption = Annotated[
     str | None,
-    typer.Option("--course", metavar="NAME|FILE", help="Course; [bold]gecar course list[/] lists them.",
+    typer.Option("--course", metavar="NAME|FILE",
+                 help="Course; [bold]gecar course list[/] lists them; random:7: a random one, random:1-20: twenty.",
                  show_default="paper", rich_help_panel=WORLD),
 ]  # fmt: skip
 RobotOption = Annotated[

@@ -11,7 +11,7 @@ from rich.table import Table
 from gecar.results.arrival import median_share, percent, share_of, with_share
 from gecar.results.config import Config
 from gecar.results.quantile import quantile
-from gecar.world.course.course import load_course
+from gecar.world.course.course import Course, load_courses
 
 _NAMES = {"crossover_rate": "crossover", "mutation_rate": "mutation"}
 
@@ -89,11 +89,18 @@ def summary_table(groups: Mapping[str, Mapping[str, Any]]) -> Table:
 
 def run_title(config: Config, result: Mapping[str, Any]) -> str:
     """Say in a few words what came of a run."""
-    course = load_course(config.course)
-    where = course.title or course.name
+    where = courses_title(load_courses(config.course))
+    if "unseen" in result:
+        return f"{where}: {result['unseen']['driven']} of {result['unseen']['of']} unseen courses driven"
     if result["solved"]:
         return f"{where}: GOAL in {with_share(result['fitness_s'], share_of(result))}"
     return f"{where}: no program at GOAL after {result['generations']} generations"
+
+
+def courses_title(courses: Sequence[Course]) -> str:
+    """Name courses by the first one's title."""
+    first = courses[0].title or courses[0].name
+    return f"{first} and {len(courses) - 1} more" if len(courses) > 1 else first
 
 
 def run_detail(config: Config, result: Mapping[str, Any]) -> str:

@@ -14,11 +14,11 @@ from gecar.search.programs import noise_seed
 from gecar.world.rollout import World
 
 
-def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
+def arrives(world: World, program: Program | None, seed: int, others: Sequence[World] = ()) -> dict[str, Any]:
     """Return how a program arrives under `REPORTED_DRAWS` fresh conditions, and at other steps, for result.json."""
     if program is None:
         return {"share": 0.0, "of": 0, "median_s": None, "p95_s": None, "steps": {}}
-    (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT))
+    (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT), others)
     return {
         "share": times.share,
         "of": REPORTED_DRAWS,
@@ -28,9 +28,10 @@ def arrives(world: World, program: Program | None, seed: int) -> dict[str, Any]:
     }
 
 
-def shares(world: World, programs: Sequence[Program], seed: int) -> list[float]:
+def shares(world: World, programs: Sequence[Program], seed: int, others: Sequence[World] = ()) -> list[float]:
     """Return the share of drives in which each program arrives, 0..1, under the conditions of `arrives`."""
-    found = arrivals(world, [program.opcodes for program in programs], REPORTED_DRAWS, (seed, REPORT))
+    opcodes = [program.opcodes for program in programs]
+    found = arrivals(world, opcodes, REPORTED_DRAWS, (seed, REPORT), others)
     return [times.share for times in found]
 
 

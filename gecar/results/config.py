@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -32,7 +33,8 @@ class Config(BaseModel):
     preset
         Name of the search settings it started from.
     course, grammar, robot
-        Names, or files.
+        Names, or files. Several courses are named as for `gecar.world.course.course.course_names`: drawn conditions are
+        then spread over all of them, and the first is that of eq. 1.
     seed
         Random seed.
     executor, workers, scheduler
@@ -68,6 +70,12 @@ class Config(BaseModel):
     search: Settings = Settings()
 
     @property
+    def course_name(self) -> str:
+        """The courses' names in short, fit for the name of a folder."""
+        stems = (Path(part).stem for part in self.course.split("+"))
+        return re.sub(r"[^\w.+-]", "-", "+".join(stems))[:60]
+
+    @property
     def identity(self) -> dict[str, Any]:
         """What the result depends on, files' contents apart."""
         return self.model_dump(exclude=NOT_PART_OF_THE_RESULT)
@@ -94,9 +102,11 @@ def configure(table: Mapping[str, Any], where: str | Path = "configuration") -> 
     if not isinstance(search, Mapping):
         raise expected(f"{where}, search", repr(search)[:40], "a table of settings")
     given["search"] = preset(given.get("preset", "paper"), search, f"{where}, search")
-    for field in ("course", "grammar", "robot"):
+    for field in ("grammar", "robot"):
         if field in given:
             given[field] = _place(str(given[field]))
+    if "course" in given:
+        given["course"] = _places(str(given["course"]))
     try:
         return Config.model_validate(given)
     except ValidationError as error:
@@ -145,6 +155,13 @@ def _pairs(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[tuple[str
     return flat + [
         (f"search.{name}", value, theirs["search"][name]) for name, value in ours["search"].items()
     ]
+
+
+def _places(names: str) -> str:
+    """Do the same for each of several courses, where they are several."""
+    return (
+        _place(names) if is_file(Path(names)) else "+".join(_place(name.strip()) for name in names.split("+"))
+    )
 
 
 def _place(name: str) -> str:

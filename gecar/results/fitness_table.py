@@ -175,7 +175,7 @@ def row_name(row: Row) -> str:
     """Name a row by what is run."""
     config = config_of(row)
     place = f"{config.preset}, " if "program" not in row else ""
-    place += f"course {Path(config.course).stem}"
+    place += f"course {config.course_name}"
     place += f", grammar {Path(config.grammar).stem}" if config.grammar != "paper" else ""
     place += f", robot {Path(config.robot).stem}" if config.robot != "ev3" else ""
     if "program" in row:

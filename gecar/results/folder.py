@@ -27,7 +27,8 @@ from gecar.results.checkpoint import pack, unpack
 REQUIRED = ("generation", "best", "mean", "valid", "distinct", "evaluations", "wall_s")
 """Columns every history.csv has; see `gecar.evolution.history.Generation`."""
 
-FILES = ("config.toml", "history.csv", "best.txt", "result.json", "checkpoint")
+UNSEEN_FILE = "unseen.csv"
+FILES = ("config.toml", "history.csv", "best.txt", "result.json", "checkpoint", UNSEEN_FILE)
 
 
 def check_new(path: Path) -> None:

@@ -6,6 +6,7 @@ import hashlib
 import platform
 import shutil
 import subprocess
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -37,19 +38,25 @@ def commit() -> str:
     return said.stdout.strip()
 
 
-def fingerprints(grammar: Grammar, course: Course, robot: Robot) -> dict[str, str]:
+def fingerprints(grammar: Grammar, courses: Sequence[Course], robot: Robot) -> dict[str, str]:
     """Return hashes of what a run reads, by what it says and not by how its files are written."""
+    laid = [course_fingerprint(course) for course in courses]
+    rules = [(rule.name, [production.parts for production in rule.productions]) for rule in grammar.rules]
+    return {
+        "grammar": _hash(repr(rules)),
+        "course": laid[0] if len(laid) == 1 else _hash(repr(laid)),
+        "robot": _hash(robot.model_dump_json()),
+    }
+
+
+def course_fingerprint(course: Course) -> str:
+    """Return a hash of what lies on a course."""
     image = course.image and (course.image.brightness.tobytes(), course.image.pixels_per_metre)
     laid = (
         course.layout, course.start, course.start_tile, course.sequence.tolist(), course.walls.tolist(),
         course.obstacles, image,
     )  # fmt: skip
-    rules = [(rule.name, [production.parts for production in rule.productions]) for rule in grammar.rules]
-    return {
-        "grammar": _hash(repr(rules)),
-        "course": _hash(repr(laid)),
-        "robot": _hash(robot.model_dump_json()),
-    }
+    return _hash(repr(laid))
 
 
 def _hash(text: str) -> str:

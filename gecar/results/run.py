@@ -24,25 +24,27 @@ from gecar.parallel.executors import open_executor, side_by_side
 from gecar.results.arrival import arrives
 from gecar.results.autosave import Saver
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
-from gecar.results.folder import RunFolder, check_new
+from gecar.results.folder import UNSEEN_FILE, RunFolder, check_new
+from gecar.results.generalisation import drives_csv, drives_on, summed_up, unseen_courses
 from gecar.results.provenance import fingerprints, versions
 from gecar.search.batches import Batches
 from gecar.search.chance import chosen
 from gecar.search.evaluation import DriveEvaluator
 from gecar.search.programs import RobotPrograms, noise_seed
-from gecar.world.course.course import load_course
+from gecar.world.course.course import load_courses
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Noise, World, simulate
 
 
 @dataclass(frozen=True)
 class Task:
-    """A configuration, and what its names stand for."""
+    """A configuration, and what its names stand for; ``others`` are the worlds of further courses."""
 
     config: Config
     mapper: Mapper
     world: World
     fingerprints: Mapping[str, str]
+    others: tuple[World, ...] = ()
 
     @property
     def configuration(self) -> str:
@@ -59,7 +61,12 @@ class Task:
         """What scores programs."""
         search = self.config.search
         return DriveEvaluator(
-            self.world, search.needs_arrivals, search.draws, search.arrival_share, self.config.seed
+            self.world,
+            search.needs_arrivals,
+            search.draws,
+            search.arrival_share,
+            self.config.seed,
+            self.others,
         )
 
     @property
@@ -92,10 +99,17 @@ def load_task(config: Config) -> Task:
     grammar = load_grammar(config.grammar)
     check_robot_language(grammar)
     options = MappingOptions(config.wraps, config.single_choice_consumes, config.max_symbols)
-    robot, course = load_robot(config.robot), load_course(config.course)
+    robot, courses = load_robot(config.robot), load_courses(config.course)
+    if len(courses) > 1 and config.search.draws == 1:
+        raise expected(
+            "draws", f"1 with {len(courses)} courses", "2 or more: the nominal drive is on the first"
+        )
     noise = Noise(config.noise, 0.01 * config.motor_noise)
-    world = World(robot, course, config.step_s, config.time_limit_s, noise, config.engine)
-    return Task(config, Mapper(grammar, options), world, fingerprints(grammar, course, robot))
+    world, *others = (
+        World(robot, course, config.step_s, config.time_limit_s, noise, config.engine) for course in courses
+    )
+    made = fingerprints(grammar, courses, robot)
+    return Task(config, Mapper(grammar, options), world, made, tuple(others))
 
 
 @dataclass(frozen=True)
@@ -212,7 +226,9 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     choose(task, evolution)
     folder.save(evolution.state(), task.configuration)  # who came from whom is asked of the program chosen
     folder.write_reports(evolution)
-    return folder.write_result(evolution, measured(task, evolution))
+    return folder.write_result(
+        evolution, measured(task, evolution) | _generalisation(task, evolution, folder)
+    )
 
 
 def search(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
@@ -229,15 +245,27 @@ def choose(task: Task, evolution: Evolution[Program]) -> None:
     search, contenders = task.config.search, evolution.contenders
     programs = [contender.program.opcodes for contender in contenders if contender.program is not None]
     if search.draws > 1 and len(programs) > 1:
-        evolution.choose(contenders[chosen(task.world, programs, search.arrival_share, evolution.seed)])
+        share, seed = search.arrival_share, evolution.seed
+        evolution.choose(contenders[chosen(task.world, programs, share, seed, task.others)])
 
 
 def measured(task: Task, evolution: Evolution[Program]) -> dict[str, Any]:
     """Return what is measured of the best program at the end: whether pymunk agrees, and how it arrives elsewhere."""
     return {
         "verified_on_pymunk": verified_on_pymunk(task, evolution),
-        "arrives": arrives(task.world, evolution.best.program, evolution.seed),
+        "arrives": arrives(task.world, evolution.best.program, evolution.seed, task.others),
     }
+
+
+def _generalisation(task: Task, evolution: Evolution[Program], folder: RunFolder) -> dict[str, Any]:
+    """Test what was evolved on several courses on unseen ones; write the drives, and return what they come to."""
+    program = evolution.best.program
+    if not task.others or program is None:
+        return {}
+    names = unseen_courses([world.course for world in (task.world, *task.others)])
+    drives = drives_on(task.world, program, names, evolution.seed)
+    folder.write(UNSEEN_FILE, drives_csv(drives))
+    return {"unseen": {"courses": names} | summed_up(drives)}
 
 
 def verified_on_pymunk(task: Task, evolution: Evolution[Program]) -> bool:

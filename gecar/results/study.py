@@ -20,7 +20,7 @@ from gecar.language.grammar import load_grammar
 from gecar.results.config import NOT_PART_OF_THE_RESULT, Config, configure, identify, merged
 from gecar.results.provenance import fingerprints, versions
 from gecar.search.settings import TABLE_4_CROSSOVER_RATES, TABLE_4_MUTATION_RATES, Settings
-from gecar.world.course.course import load_course
+from gecar.world.course.course import load_courses
 from gecar.world.robot import load_robot
 
 MAX_RUNS = 100_000
@@ -272,4 +272,4 @@ def _slug(value: Any) -> str:
 
 @lru_cache(maxsize=256)
 def _fingerprints(grammar: str, course: str, robot: str) -> dict[str, str]:
-    return fingerprints(load_grammar(grammar), load_course(course), load_robot(robot))
+    return fingerprints(load_grammar(grammar), load_courses(course), load_robot(robot))

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from gecar.evolution.scores import UNSOLVED
 from gecar.parallel.executors import usable_cores
-from gecar.world.kernel.conditions import Conditions
-from gecar.world.perturbation import drawn_conditions
+from gecar.search.courses import paces, spread
+from gecar.world.kernel.conditions import Conditions, select
 from gecar.world.rollout import Fleet, World, goal_times
 
 ROUNDS = 8
@@ -116,7 +116,11 @@ class Arrivals(NamedTuple):
 
 
 def arrivals(
-    world: World, programs: Sequence[npt.NDArray[np.int32]], draws: int, seed: int | tuple[int, ...]
+    world: World,
+    programs: Sequence[npt.NDArray[np.int32]],
+    draws: int,
+    seed: int | tuple[int, ...],
+    others: Sequence[World] = (),
 ) -> list[Arrivals]:
     """Drive programs under the same fresh conditions.
 
@@ -130,8 +134,15 @@ def arrivals(
         How many conditions.
     seed
         Where they come from.
+    others
+        Further courses that the conditions are spread over; see `gecar.search.courses`.
     """
-    times = times_to_goal(world, programs, drawn_conditions(world, draws, seed), np.arange(draws) + 1)
+    worlds = world, *others
+    under, course = spread(worlds, draws, seed)
+    times = np.empty((len(programs), draws))
+    for here, (each, pace) in enumerate(zip(worlds, paces(worlds), strict=True)):
+        rows = np.flatnonzero(course == here)
+        times[:, rows] = pace * times_to_goal(each, programs, select(under, rows.tolist()), rows + 1)
     return [Arrivals(row) for row in times]
 
 
@@ -192,7 +203,13 @@ def merit_of(times: Arrivals, share: float) -> float:
     return median if median is not None and times.share >= share else UNSOLVED + 1.0 - times.share
 
 
-def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float, seed: int) -> int:
+def chosen(
+    world: World,
+    programs: Sequence[npt.NDArray[np.int32]],
+    share: float,
+    seed: int,
+    others: Sequence[World] = (),
+) -> int:
     """Return which of a search's best programs is best on fresh draws: all on 64, the better quarter on 448 more.
 
     What looks best in a search is partly lucky; these draws are none of the search's, and the result is measured on
@@ -202,10 +219,10 @@ def chosen(world: World, programs: Sequence[npt.NDArray[np.int32]], share: float
     at_steps = drives_at_steps(world, programs, (world.step_s, *CHOICE_STEPS_S))
     slowest = at_steps.max(axis=1)
     unsteady = slowest > STEADY * at_steps.min(axis=1)
-    first = arrivals(world, programs, 64, (seed, _CHOICE, 0))
+    first = arrivals(world, programs, 64, (seed, _CHOICE, 0), others)
     order = np.lexsort((np.maximum([merit_of(times, share) for times in first], slowest), unsteady))
     left = order[: max(1, (len(order) + 3) // 4)].tolist()
-    second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1))
+    second = arrivals(world, [programs[k] for k in left], 448, (seed, _CHOICE, 1), others)
     both = [
         Arrivals(np.concatenate([first[k].times_s, more.times_s]))
         for k, more in zip(left, second, strict=True)

@@ -15,9 +15,10 @@ import numpy.typing as npt
 from gecar.evolution.scores import UNSOLVED, Scores
 from gecar.parallel.pickled import Pickled, unpickled
 from gecar.search.chance import FIRST_DRAWS, MARGIN, n_times, pool
+from gecar.search.courses import paces, spread
 from gecar.search.fitness import score_type
 from gecar.world.kernel.conditions import Conditions, impatient
-from gecar.world.perturbation import drawn_conditions, drawn_steps_s
+from gecar.world.perturbation import drawn_steps_s
 from gecar.world.rollout import Fleet, Outcome, World, goal_times
 
 Opcodes = npt.NDArray[np.int32]
@@ -49,6 +50,8 @@ class DriveEvaluator:
         Share of arrivals it needs.
     seed
         Where the conditions come from.
+    others
+        The same robot on further courses: drawn conditions are spread over all (`gecar.search.courses`).
     """
 
     world: World
@@ -56,6 +59,7 @@ class DriveEvaluator:
     draws: int = 1
     required_share: float = 0.95
     seed: int = 0
+    others: tuple[World, ...] = ()
 
     def __call__(
         self,
@@ -80,7 +84,7 @@ class DriveEvaluator:
     def _nominal(self, programs: Sequence[Opcodes], seeds: Sequence[int]) -> Scores:
         scores = np.zeros(len(programs), score_type(self.n_arrivals, n_times(self.draws)))
         pairs = np.stack([np.arange(len(programs)), np.zeros(len(programs))], axis=1)
-        summary, arrival = self._fleet.drive(programs, self._world_says, pairs, seeds)
+        summary, arrival = self._fleet_on(0).drive(programs, self._world_says, pairs, seeds)
         for field in ("outcome", "checkpoints", "time_s", "steps"):
             scores[field] = summary[field]
         solved = summary["outcome"] == Outcome.GOAL
@@ -100,7 +104,8 @@ class DriveEvaluator:
         generation: int,
     ) -> None:
         """Drive what may still be good under the generation's conditions, in two stages."""
-        under = impatient(drawn_conditions(self.world, self.draws - 1, (self.seed, generation)))
+        drawn, course = spread(self._worlds, self.draws - 1, (self.seed, generation))
+        under = impatient(drawn)
         first = min(FIRST_DRAWS, self.draws - 1)
         allowed = math.floor((1.0 - self.required_share) * self.draws + 1e-9)
         for begin, end in ((0, first), (first, self.draws - 1)):
@@ -118,7 +123,10 @@ class DriveEvaluator:
             k, row = _pairs(left, np.arange(begin, end))
             drive_number = generation * self.draws + row + 1
             streams = np.array(seeds, np.uint64)[k] + drive_number.astype(np.uint64) * _NEXT_STREAM
-            scores["drawn_s"][k, row] = self._driven(scores, programs, k, under, row, streams)
+            for here in np.unique(course[row]):
+                mine = course[row] == here
+                times = self._driven(scores, programs, k[mine], under, row[mine], streams[mine], here)
+                scores["drawn_s"][k[mine], row[mine]] = times * self._paces[here]
         missed = np.isinf(scores["drawn_s"]).sum(axis=1)
         self._at_other_steps(scores, left[missed[left] <= allowed], programs, seeds, generation)
 
@@ -145,9 +153,10 @@ class DriveEvaluator:
         under: Conditions,
         row: npt.NDArray[np.intp],
         streams: npt.NDArray[np.uint64],
+        course: int = 0,
     ) -> npt.NDArray[np.float64]:
         """Drive programs ``k`` under conditions ``row``; return times to GOAL [s]; the scores count the steps."""
-        summary, _ = self._fleet.drive(programs, under, np.stack([k, row], axis=1), streams)
+        summary, _ = self._fleet_on(course).drive(programs, under, np.stack([k, row], axis=1), streams)
         np.add.at(scores["steps"], k, summary["steps"])
         return goal_times(summary)
 
@@ -161,8 +170,22 @@ class DriveEvaluator:
         return shares
 
     @cached_property
-    def _fleet(self) -> Fleet:
-        return Fleet(self.world)
+    def _worlds(self) -> tuple[World, ...]:
+        return self.world, *self.others
+
+    @cached_property
+    def _paces(self) -> npt.NDArray[np.float64]:
+        return paces(self._worlds)
+
+    @cached_property
+    def _fleets(self) -> dict[int, Fleet]:
+        return {}
+
+    def _fleet_on(self, course: int) -> Fleet:
+        """Return a course's arrays, made when it is first driven on."""
+        if course not in self._fleets:
+            self._fleets[course] = Fleet(self._worlds[course])
+        return self._fleets[course]
 
     @cached_property
     def _world_says(self) -> Conditions:
@@ -170,8 +193,10 @@ class DriveEvaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle without what can be made again: a course without its raster is 2 kB instead of 3 MB."""
-        bare = replace(self.world, course=replace(self.world.course))
-        return DriveEvaluator, (bare, self.keep_arrivals, self.draws, self.required_share, self.seed)
+        bare, *others = (replace(world, course=replace(world.course)) for world in self._worlds)
+        return DriveEvaluator, (
+            bare, self.keep_arrivals, self.draws, self.required_share, self.seed, tuple(others),
+        )  # fmt: skip
 
 
 def _pairs(

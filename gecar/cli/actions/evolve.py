@@ -16,8 +16,9 @@ from gecar.cli.progress import Watch
 from gecar.compiled import is_cold, mark_warm
 from gecar.evolution.scores import UNSOLVED
 from gecar.report.drive import arrival_of, sentence_of, standing_of
-from gecar.report.runs import effort_of
+from gecar.report.runs import courses_title, effort_of
 from gecar.results.config import configure, merged, read_config
+from gecar.results.generalisation import sentence
 from gecar.results.run import Started, finish, resume, start
 from gecar.search.chance import AS_GOOD
 from gecar.search.settings import DEFAULT_PRESET
@@ -45,7 +46,7 @@ def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: b
     """
     table = merged({"preset": DEFAULT_PRESET} | (read_config(file) if file else {}), changes)
     wanted = configure(table, file or "options")
-    folder = out or Path("runs") / f"{Path(wanted.course).stem}-{wanted.preset}-seed{wanted.seed}"
+    folder = out or Path("runs") / f"{wanted.course_name}-{wanted.preset}-seed{wanted.seed}"
     return resume(folder, table if file else changes) if again else start(wanted, folder)
 
 
@@ -78,10 +79,11 @@ def run_to_the_end(output: Output, started: Started, pictures: bool, quiet: bool
 
 
 def _announce(output: Output, started: Started) -> None:
-    settings, course = started.evolution.settings, started.task.world.course
+    task, settings = started.task, started.evolution.settings
+    where = courses_title([world.course for world in (task.world, *task.others)])
     output.print(
-        f"Evolving on {course.title or course.name}: {settings.population} programs, "
-        f"{settings.generations} generations, preset {started.task.config.preset}, seed {started.evolution.seed}"
+        f"Evolving on {where}: {settings.population} programs, "
+        f"{settings.generations} generations, preset {task.config.preset}, seed {started.evolution.seed}"
     )
     if started.evolution.history:
         output.print(f"Going on after generation {started.evolution.generation}")
@@ -126,6 +128,8 @@ def _tell(output: Output, started: Started, result: dict[str, Any], pictures: li
                 f"What looked faster in the search ({fastest:.2f} s) was less reliable on fresh drives."
             )
         output.print(standing_of(world, drive))
+        if "unseen" in result:
+            output.print(f"The time is that on the first course. {sentence(result['unseen'])}")
         same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
         output.print(f"With pymunk moving the body, the drive {same}.")
     output.print(effort_of(result))

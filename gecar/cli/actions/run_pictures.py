@@ -12,6 +12,7 @@ from gecar.cli.output import Output
 from gecar.errors import expected
 from gecar.evolution.lineage import Member
 from gecar.language.program import Program, read_program
+from gecar.plots.courses.many import courses_figure
 from gecar.plots.drives.classroom import write_classroom_page
 from gecar.plots.drives.trajectory import trajectory
 from gecar.plots.runs.compare_runs import compare_runs
@@ -23,11 +24,12 @@ from gecar.plots.style import save
 from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
 from gecar.report.runs import came_to, group_names, run_detail, run_title, summaries, summary_table
 from gecar.results.ancestry import Ancestry, read_ancestry
-from gecar.results.arrival import arriving, share_of, shares
+from gecar.results.arrival import arriving, percent, share_of, shares
 from gecar.results.config import Config
-from gecar.results.folder import read_history, read_result
-from gecar.results.run import load_task
-from gecar.world.course.course import load_course
+from gecar.results.folder import UNSEEN_FILE, read_history, read_result
+from gecar.results.generalisation import CourseDrive, read_drives, summed_up
+from gecar.results.run import Task, load_task
+from gecar.world.course.course import course_names, load_course, load_courses
 from gecar.world.perturbation import under_drawn_conditions
 from gecar.world.robot import load_robot
 from gecar.world.rollout import Drive, World, simulate
@@ -37,7 +39,7 @@ SHOWN = 20
 
 
 def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
-    """Draw a run's convergence and its best program's drive.
+    """Draw a run's convergence, its best program's drive, and the unseen courses that it was tested on.
 
     Parameters
     ----------
@@ -61,7 +63,21 @@ def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
     drawn = [draw_convergence(folder, target / "convergence.png")]
     if read_result(folder)["program"]:
         drawn.append(draw_trajectory(folder, target / "trajectory.png"))
+    if (folder / UNSEEN_FILE).is_file():
+        drawn.append(draw_drives(read_drives(folder / UNSEEN_FILE), target / "unseen.png"))
     return drawn
+
+
+def draw_drives(drives: Sequence[CourseDrive], target: Path, kind: str = "unseen courses") -> Path:
+    """Draw which of several courses a program drives."""
+    told = summed_up(drives)
+    title = f"{told['driven']} of {told['of']} {kind} driven"
+    arriving = f"{percent(told['arrive'])} of drives under random conditions arrive"
+    detail = f"blue: driven · orange: not, with a cross where the robot failed · {arriving}"
+    failures = {each.course: each.checkpoints for each in drives if not each.driven}
+    return save(
+        courses_figure([load_course(each.course) for each in drives], failures, title, detail), target
+    )
 
 
 def study_run(folder: Path, out: Path | None = None) -> list[Path]:
@@ -97,7 +113,9 @@ def _best_drive(folder: Path) -> tuple[World, Program, Drive, str]:
     file, settings = find_program(folder)
     world, program = build_world(settings), read_program(file)
     drive = simulate(world, program.opcodes, drive_seed(None, settings, program), trace=True)
-    return world, program, drive, title_of(drive, world.course, share_of(read_result(folder)))
+    several = len(course_names(read_run_config(folder).course)) > 1  # result.json then has the share on all
+    share = shares(world, [program], settings["seed"])[0] if several else share_of(read_result(folder))
+    return world, program, drive, title_of(drive, world.course, share)
 
 
 def draw_tree(folder: Path, target: Path) -> Path:
@@ -122,17 +140,17 @@ def draw_genealogy(folder: Path, target: Path) -> Path:
     )
     detail += f" · preset {config.preset}, seed {config.seed}"
     title = run_title(config, result)
-    share = _shares_in(load_task(config).world, ancestry, config.seed)
+    share = _shares_in(load_task(config), ancestry)
     figure = genealogy(ancestry.lineage, ancestry.winner, ancestry.program, share, title, detail)
     return save(figure, target)
 
 
-def _shares_in(world: World, ancestry: Ancestry, seed: int) -> Callable[[Member], float | None]:
+def _shares_in(task: Task, ancestry: Ancestry) -> Callable[[Member], float | None]:
     """Return what measures the share of drives in which an individual's program arrives, each program once."""
 
     @cache
     def measured(program: Program) -> float:
-        return shares(world, [program], seed)[0]
+        return shares(task.world, [program], task.config.seed, task.others)[0]
 
     def share(member: Member) -> float | None:
         program = ancestry.program(member)
@@ -184,7 +202,7 @@ def write_drive_page(folder: Path, target: Path) -> Path:
 
 def references(config: Config) -> Sequence[Reference]:
     """Return the times a run's best is compared with."""
-    bound = load_course(config.course).lower_bound_s(load_robot(config.robot))
+    bound = load_courses(config.course)[0].lower_bound_s(load_robot(config.robot))
     paper = [Reference("the paper's best", PAPER_BEST_S)] if config.course == "paper" else []
     return [*paper, Reference("lower bound", bound)]
 

@@ -120,7 +120,7 @@ def study(output: Output, asked: Asked, pictures: bool, quiet: bool) -> None:
     wanted, place = asked.study(), asked.place()
     runs = wanted.plan()
     first = runs[0].config
-    out = asked.out or Path("runs") / f"table-{Path(first.course).stem}-{first.preset}"
+    out = asked.out or Path("runs") / f"table-{first.course_name}-{first.preset}"
     for config in {
         (c.grammar, c.course, c.robot, c.engine): c for c in (run.config for run in runs)
     }.values():

@@ -98,17 +98,28 @@ def simulate(
       gecar simulate best.txt --html drive.html
       gecar simulate best.txt --robustness robustness.png
       gecar simulate best.txt --noise 2 --motor-noise 3 --seed 7 --no-picture --json
+      gecar simulate best.txt --course random:101-200
     """
     from gecar.cli.inputs import build_world, drive_seed, find_program
     from gecar.language.program import read_program
     from gecar.report.drive import arrival_of, drive_table, sentence_of, standing_of, title_of
     from gecar.results.arrival import arrives
+    from gecar.world.course.course import course_names
     from gecar.world.rollout import simulate as run
 
     output = Output(as_json)
     if seed is not None and not 0 <= seed <= LARGEST_SEED:
         raise expected("--seed", seed, f"a whole number from 0 to {LARGEST_SEED}")
     file, settings = find_program(program)
+    if course is not None and len(course_names(course)) > 1:
+        made = {"--animate": animate, "--html": page, "--robustness": robustness, "--record": record}
+        wrong = next((option for option, value in made.items() if value is not None), None)
+        if wrong:
+            raise expected(wrong, f"several courses, '{course}'", "one")
+        world = build_world(settings, course_names(course)[0], robot, noise, motor_noise, time_limit, engine)
+        place = None if no_picture else picture or (out or file.parent) / "courses.png"
+        _drive_all(output, world, read_program(file), course, 1 if seed is None else seed, place)
+        return
     target = None if no_picture else _target(file, bool(settings), out, picture)
     _check_pictures(target, colour, animate, pace)
     if robustness is not None:
@@ -129,6 +140,27 @@ def simulate(
     written |= _record(output, world, loaded, drive, record, course)
     output.print_json(
         {"program": loaded.source, **drive_table(world, drive), "arrives": arrival, "seed": which, **written}
+    )
+
+
+def _drive_all(
+    output: Output, world: World, program: Program, courses: str, seed: int, target: Path | None
+) -> None:
+    """Drive a program on several courses; say and draw which it drives."""
+    from gecar.cli.actions.run_pictures import draw_drives
+    from gecar.plots.style import picture_kind
+    from gecar.results.generalisation import drives_on, sentence, summed_up
+
+    if target is not None:
+        picture_kind(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+    drives = drives_on(world, program, courses, seed)
+    told = summed_up(drives)
+    output.print(sentence(told, "courses"), style="bold")
+    if target is not None:
+        output.print(f"Picture: {draw_drives(drives, target, 'courses')}")
+    output.print_json(
+        {"program": program.source, "courses": courses, **told, "drives": [each._asdict() for each in drives]}
     )
 
 

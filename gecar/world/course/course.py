@@ -33,15 +33,18 @@ __all__ = [
     "Course",
     "Obstacle",
     "Pose",
+    "course_names",
     "list_courses",
     "load_course",
+    "load_courses",
     "parse_course",
     "random_course",
 ]
 
 COURSES = shipped("courses")
 _LARGEST_FILE = 1_000_000
-_RANDOM = re.compile(r"random:(\d{1,18})")
+_RANDOM = re.compile(r"random:(\d{1,18})(?:-(\d{1,18}))?")
+_MOST_COURSES = 1_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +221,10 @@ def load_course(name_or_path: str | Path) -> Course:
     InputError
         If there is no such course, or its file is wrong; one line that names the field.
     """
-    seed = _RANDOM.fullmatch(str(name_or_path))
+    names = course_names(str(name_or_path))
+    if len(names) > 1:
+        raise expected("--course", f"{len(names)} courses, '{name_or_path}'", "one")
+    seed = _RANDOM.fullmatch(names[0])
     if seed:
         return random_course(int(seed[1]))
     path = Path(name_or_path)
@@ -229,6 +235,40 @@ def load_course(name_or_path: str | Path) -> Course:
     if is_file(path) and path.stat().st_size > _LARGEST_FILE:
         raise expected(path, f"{path.stat().st_size} bytes", f"a course file of at most {_LARGEST_FILE}")
     return parse_course(read_text(path, "a course file"), str(path))
+
+
+def course_names(text: str) -> list[str]:
+    """Return the names in a text that names courses: ``paper+mine.toml``, ``random:1-20`` for twenty random courses.
+
+    Raises
+    ------
+    InputError
+        If one is named twice, there are too many, or a range runs backwards.
+    """
+    names: list[str] = []
+    for part in [text] if is_file(Path(text)) else text.split("+"):
+        seeds = _RANDOM.fullmatch(part.strip())
+        first, last = (int(seeds[1]), int(seeds[2] or seeds[1])) if seeds else (0, 0)
+        if last < first:
+            raise expected("--course", f"'{part}'", f"seeds in order, random:{last}-{first}")
+        if last - first + len(names) >= _MOST_COURSES:
+            raise expected("--course", f"'{text[:60]}'", f"at most {_MOST_COURSES} courses")
+        names += [f"random:{seed}" for seed in range(first, last + 1)] if seeds else [part.strip()]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise expected("--course", f"'{twice[0]}' twice", "different courses")
+    return names
+
+
+def load_courses(names: str) -> tuple[Course, ...]:
+    """Load one course or several, named as for `course_names`.
+
+    Raises
+    ------
+    InputError
+        As `course_names` and `load_course`.
+    """
+    return tuple(load_course(name) for name in course_names(names))
 
 
 def random_course(
