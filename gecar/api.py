@@ -133,6 +133,7 @@ def evolve(
     noise_pct: float = 0.0,
     motor_noise_pct: float = 0.0,
     time_limit_s: float = 60.0,
+    start_from: Sequence[str | Path | Program | Run] = (),
     out: str | Path | None = None,
     tell: Tell = lambda generation: None,  # noqa: ARG005
 ) -> Run:
@@ -156,6 +157,8 @@ def evolve(
         Noise of each sensor reading [%], and of each command's strength [% of it].
     time_limit_s
         Time after which a drive without GOAL ends [s].
+    start_from
+        Programs that every new population holds: programs, texts, files, or runs.
     out
         A new folder for the files of ``gecar evolve``; by default nothing is written. Then course, grammar and robot
         must be names or files, and the fitness eq. 1, because a run is resumed from its folder.
@@ -171,6 +174,7 @@ def evolve(
     options: dict[str, Any] = {
         "preset": preset, "search": changes, "seed": seed, "executor": "thread", "noise": noise_pct,
         "motor_noise": motor_noise_pct, "time_limit_s": time_limit_s,
+        "start_from": [_program(each).source for each in start_from],
     }  # fmt: skip
     if workers is not None:
         options["workers"] = workers

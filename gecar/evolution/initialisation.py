@@ -99,6 +99,29 @@ class Ptc2:
         return _ptc2(plan, self.expansions)
 
 
+@dataclass(frozen=True)
+class Seeded:
+    """Given genomes first, one each, in every new population; the others are made as usual.
+
+    Attributes
+    ----------
+    others
+        Makes the others.
+    given
+        Genomes (n, codons), such as `gecar.language.inversion.genome_of` returns.
+    """
+
+    others: Initialisation
+    given: Genomes
+
+    def __call__(self, mapper: Mapper, streams: Streams) -> Genomes:
+        """Return new genomes (streams, codons)."""
+        genomes = self.others(mapper, streams)
+        n = min(len(genomes), len(self.given))
+        genomes[:n] = self.given[:n]
+        return genomes
+
+
 def _spelled(
     mapper: Mapper,
     streams: Streams,

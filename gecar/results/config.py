@@ -45,6 +45,8 @@ class Config(BaseModel):
         Noise of each sensor reading [%], and of each command's strength [% of it].
     wraps, single_choice_consumes, max_symbols
         As in `gecar.language.mapping.MappingOptions`.
+    start_from
+        Programs that every new population of the evolution holds, as text.
     search
         The evolution's settings.
     """
@@ -67,6 +69,7 @@ class Config(BaseModel):
     wraps: int = Field(MappingOptions.wraps, ge=0, le=1_000_000)
     single_choice_consumes: bool = MappingOptions.single_choice_consumes
     max_symbols: int = Field(MappingOptions.max_symbols, ge=1, le=10_000_000)
+    start_from: tuple[str, ...] = ()
     search: Settings = Settings()
 
     @property
@@ -133,7 +136,8 @@ def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 def identify(config: Config, fingerprints: Mapping[str, str]) -> str:
     """Return a hash of all that the result depends on; a checkpoint belongs to one."""
-    text = json.dumps([config.identity, dict(fingerprints)], sort_keys=True)
+    told = {name: value for name, value in config.identity.items() if name != "start_from" or value}
+    text = json.dumps([told, dict(fingerprints)], sort_keys=True)  # as before there was start_from
     return hashlib.sha256(text.encode()).hexdigest()
 
 

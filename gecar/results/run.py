@@ -11,14 +11,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gecar.errors import InputError, expected
 from gecar.evolution.ask_tell import Evolution, rehearse, run
 from gecar.evolution.history import Generation
+from gecar.evolution.initialisation import Seeded
+from gecar.evolution.operators import Operators
 from gecar.evolution.state import State
 from gecar.language.grammar import load_grammar
+from gecar.language.inversion import genome_of
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.opcodes import MAX_DUTY_PCT
-from gecar.language.program import Program
+from gecar.language.program import Program, parse_program
 from gecar.language.robot_language import check_robot_language
 from gecar.parallel.executors import open_executor, side_by_side
 from gecar.results.arrival import arrives
@@ -84,8 +89,24 @@ class Task:
         """Return an evolution, new or from a state on."""
         search = self.config.search
         if state is None:
-            return Evolution(self.mapper, self.problem, search, self.config.seed)
-        return Evolution.resume(state, self.mapper, self.problem, search)
+            return Evolution(self.mapper, self.problem, search, self.config.seed, operators=self.operators)
+        return Evolution.resume(state, self.mapper, self.problem, search, self.operators)
+
+    @property
+    def operators(self) -> Operators:
+        """The operators that the settings name; the first genomes are those of the programs to start from.
+
+        Raises
+        ------
+        InputError
+            If the grammar has no derivation for one of them.
+        """
+        plain = Operators.of(self.config.search)
+        programs = [parse_program(text, "start_from") for text in self.config.start_from]
+        if not programs:
+            return plain
+        given = [genome_of(self.mapper, each, self.config.search.codons) for each in programs]
+        return Operators.of(self.config.search, initialise=Seeded(plain.initialise, np.array(given)))
 
 
 def load_task(config: Config) -> Task:
@@ -131,9 +152,10 @@ def start(config: Config, out: Path) -> Started:
     """
     check_new(out)
     task = load_task(config)
+    evolution = task.evolution()
     side_by_side(*task.place)  # whoever has no cluster shall hear of it before there is a folder
     about = {"provenance": versions(), "fingerprints": task.fingerprints}
-    return Started(task, RunFolder.create(out, as_toml(config, about)), task.evolution())
+    return Started(task, RunFolder.create(out, as_toml(config, about)), evolution)
 
 
 def resume(out: Path, changes: Mapping[str, Any] | None = None) -> Started:

@@ -60,6 +60,11 @@ def evolve(
     grammar: Annotated[
         str | None, _search("--grammar", "Grammar of the programs.", "paper", "NAME|FILE")
     ] = None,
+    start_from: Annotated[
+        list[Path] | None,
+        _search("--start-from", "A program that the evolution starts from, of any origin; may be given several times.",
+                metavar="FILE|RUN"),
+    ] = None,
     wraps: Annotated[int | None, _search("--wraps", "Maximum genome wraps.", "0")] = None,
     course: CourseOption = None,
     robot: RobotOption = None,
@@ -110,6 +115,8 @@ def evolve(
       gecar evolve --course hairpin --seed 7 --out runs/hairpin-7
       gecar evolve --preset paper --crossover-rate 0.7 --mutation-rate 0.03
       gecar evolve runs/hairpin-7/config.toml --seed 8
+      gecar evolve --course random:1-20 --grammar memory
+      gecar evolve --course hairpin --start-from best.txt
       gecar evolve --resume --out runs/hairpin-7
     """
     from gecar.parallel.executors import prepare_workers
@@ -122,11 +129,16 @@ def evolve(
         "tournament": tournament, "crossover_rate": crossover_rate, "mutation_rate": mutation_rate,
         "draws": draws, "arrival_share": share,
     }  # fmt: skip
-    options = {
+    options: dict[str, Any] = {
         "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
         "time_limit_s": time_limit, "engine": engine, "noise": noise, "motor_noise": motor_noise, "wraps": wraps,
         "executor": executor or ("dask" if scheduler else None), "scheduler": scheduler,
     }  # fmt: skip
+    if start_from:
+        from gecar.cli.inputs import find_program
+        from gecar.language.program import read_program
+
+        options["start_from"] = [read_program(find_program(place)[0]).source for place in start_from]
     changes = given(options) | {"search": given(search) | settings(setting or [])}
     from gecar.cli.actions.evolve import begin, run_to_the_end
 
