@@ -6,6 +6,7 @@ import pytest
 
 from gecar.errors import InputError
 from gecar.evolution.ask_tell import Evolution
+from gecar.evolution.history import Totals, summary
 from gecar.evolution.settings import EvolutionSettings
 from gecar.language.grammar import parse_grammar
 from gecar.language.mapping import Mapper
@@ -45,3 +46,16 @@ def test_equal_seeds_find_the_same() -> None:
 def test_lexicase_needs_cases() -> None:
     with pytest.raises(InputError, match="selection: found lexicase without cases"):
         Evolution(SUMS, settings=SMALL.model_copy(update={"selection": "lexicase"}))
+
+
+def test_the_history_tells_size_depth_and_diversity() -> None:
+    evolution = evolved(seed=1)
+    for record in evolution.history:
+        assert record.size >= 1.0
+        assert record.depth >= 2.0 or record.size < 2.0
+        assert 0.0 <= record.entropy <= math.log2(SMALL.population)
+    mapped = SUMS.map([[2] * 60, [0, 2, 3] + [0] * 57])  # x, and x + 1
+    scores = evolution.problem.failed(2)
+    programs = [b"a", b"a", b"b", b"c"]
+    record = summary(0, scores, programs, mapped, Totals(), 0.0)
+    assert (record.size, record.depth, record.entropy) == (2.0, 1.5, 1.5)

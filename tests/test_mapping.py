@@ -9,6 +9,7 @@ from gecar.errors import InputError
 from gecar.language import derivation
 from gecar.language.grammar import Grammar, load_grammar, parse_grammar
 from gecar.language.mapping import Mapped, Mapper, MappingOptions
+from gecar.language.structured import StructuredMapper
 
 SMALL = MappingOptions(max_symbols=500)
 
@@ -221,3 +222,23 @@ def test_paper_phenotypes_are_programs() -> None:
 
 def test_a_phenotype_that_is_no_program_is_none() -> None:
     assert map_one(load_grammar("table1"), [3, 0, 2, 1, 2, 2]).program(0) is None
+
+
+def test_depths_count_nonterminals_from_the_start_down():
+    mapper = Mapper(load_grammar("nested"))
+    mapped = mapper.map(np.random.default_rng(2).integers(0, 256, (30, 200), np.uint8))
+    assert not mapped.depths[~mapped.valid].any()
+    for i in np.flatnonzero(mapped.valid):
+        tree = mapped.tree(int(i))
+        depth = [1] * len(tree)
+        for node, each in enumerate(tree):
+            for child in (part for part in each.parts if isinstance(part, int)):
+                depth[child] = depth[node] + 1
+        assert mapped.depths[i] == max(depth)
+
+
+def test_genes_of_a_structured_genome_have_depths_too():
+    mapper = StructuredMapper(load_grammar("santa_fe"), gene=10, depth=6)
+    mapped = mapper.map(np.random.default_rng(2).integers(0, 256, (10, mapper.codons), np.uint8))
+    assert mapped.valid.any()
+    assert (mapped.depths[mapped.valid] >= 3).all()

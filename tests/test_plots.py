@@ -11,6 +11,7 @@ from gecar.plots.drives.path import by_line, every_distance, line_colours, speed
 from gecar.plots.drives.trajectory import trajectory
 from gecar.plots.runs.compare_runs import compare_runs
 from gecar.plots.runs.convergence import Reference, convergence
+from gecar.plots.runs.population import population_figure
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
 from gecar.world.rollout import World, simulate
@@ -32,6 +33,12 @@ def history(best):
         "distinct": np.linspace(0.9, 0.2, len(best)),
         "evaluations": 200 * (generation + 1),
     }
+
+
+def test_sizes_depths_and_diversity_are_drawn_whole():
+    rising = {name: np.linspace(1.0, 5.0, 40) for name in ("size", "depth", "entropy")}
+    figure = population_figure({"generation": np.arange(40.0), **rising}, 40, "A title", "a detail")
+    assert style.is_whole(figure)
 
 
 @pytest.mark.parametrize("program", [LAPS, ENDLESS], ids=["short", "long"])

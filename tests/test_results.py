@@ -360,14 +360,14 @@ def test_a_forged_checkpoint_is_refused(body: bytes) -> None:
     from gecar.results.checkpoint import _checksum
 
     for text in (body, b'{"configuration": "mine", "sizes": [5, 0, 0], "rows": {}}\n' + body):
-        raw = b"gecar checkpoint 3 " + _checksum(text) + b"\n" + text
+        raw = b"gecar checkpoint 4 " + _checksum(text) + b"\n" + text
         with pytest.raises(InputError):
             unpack(raw, "mine", HERE)
 
 
 def test_a_checkpoint_of_a_later_version_is_refused_as_such() -> None:
-    with pytest.raises(InputError, match="found a checkpoint of version '4', expected version 3"):
-        unpack(WHOLE.replace(b"checkpoint 3", b"checkpoint 4", 1), "mine", HERE)
+    with pytest.raises(InputError, match="found a checkpoint of version '5', expected version 4"):
+        unpack(WHOLE.replace(b"checkpoint 4", b"checkpoint 5", 1), "mine", HERE)
 
 
 def test_a_configuration_written_reads_back_equal() -> None:

@@ -395,9 +395,10 @@ class Evolution(Generic[P]):
             self.totals.simulated + len(told),
             self.totals.steps + int(told["steps"].sum()),
         )
-        programs = len({phenotype.digest for phenotype in offspring.phenotypes if phenotype is not None})
+        programs = [phenotype.digest for phenotype in offspring.phenotypes if phenotype is not None]
+        mapped = self.mapper.map(offspring.genomes)
         record = summary(
-            len(self.history), self.scores, programs, totals, self._wall_s(), self.problem.failure
+            len(self.history), self.scores, programs, mapped, totals, self._wall_s(), self.problem.failure
         )
         self.history.append(record)
         self._patience.see(self.history[-1].best)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, get_type_hints
@@ -9,6 +11,7 @@ from typing import NamedTuple, get_type_hints
 import numpy as np
 
 from gecar.evolution.scores import INVALID, UNSOLVED, Scores
+from gecar.language.mapping import Mapped
 
 
 class Generation(NamedTuple):
@@ -36,6 +39,12 @@ class Generation(NamedTuple):
         Programs scored since the run began: evaluations that no earlier one answered.
     steps
         What scoring cost since the run began; of robot programs, simulation steps.
+    size, depth
+        Mean over the population of the choices a derivation takes, and of its tree's depth in nonterminals; nan without
+        any derivation.
+    entropy
+        Shannon entropy of the population's programs [bits]: 0 where all are the same, log2 of the population where all
+        differ.
     """
 
     generation: int
@@ -49,6 +58,9 @@ class Generation(NamedTuple):
     mean_solved: float
     simulated: int
     steps: int
+    size: float = math.nan
+    depth: float = math.nan
+    entropy: float = math.nan
 
 
 HISTORY = np.dtype(
@@ -69,7 +81,8 @@ class Totals:
 def summary(
     generation: int,
     scores: Scores,
-    programs: int,
+    programs: Sequence[bytes],
+    mapped: Mapped,
     totals: Totals,
     wall_s: float,
     failure: float = UNSOLVED,
@@ -83,7 +96,9 @@ def summary(
     scores
         The population's.
     programs
-        How many different ones it holds.
+        Digests of its programs, those that are the same alike.
+    mapped
+        Its derivations.
     totals
         Spent so far.
     wall_s
@@ -98,14 +113,23 @@ def summary(
         best=float(fitness.min()),
         mean=float(fitness.mean()),
         valid=float(np.mean(scores["outcome"] != INVALID)),
-        distinct=programs / len(scores),
+        distinct=len(set(programs)) / len(scores),
         evaluations=totals.evaluations,
         wall_s=wall_s,
         solved=float(solved.mean()),
         mean_solved=float(fitness[solved].mean()) if solved.any() else float("nan"),
         simulated=totals.simulated,
         steps=totals.steps,
+        size=float(mapped.used[mapped.valid].mean()) if mapped.valid.any() else math.nan,
+        depth=float(mapped.depths[mapped.valid].mean()) if mapped.valid.any() else math.nan,
+        entropy=_entropy(programs),
     )
+
+
+def _entropy(programs: Sequence[bytes]) -> float:
+    """Return the entropy of a distribution of programs [bits]; nan for none."""
+    shares = np.array([*Counter(programs).values()]) / max(len(programs), 1)
+    return float(-(shares * np.log2(shares)).sum()) + 0.0 if programs else math.nan
 
 
 WITHOUT_SUCCESS = 4

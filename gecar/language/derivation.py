@@ -224,6 +224,23 @@ def lay_nodes(
 
 
 @compiled
+def tree_depths(node_offsets: Int64s, production: Int32s, table: Tables, stack: Int32s) -> Int32s:
+    """Return the depth of every derivation tree, in nonterminals from the start down; 0 where there is none."""
+    depths = np.zeros(node_offsets.size - 1, np.int32)
+    for i in range(depths.size):
+        stack[0] = 1
+        waiting = 1
+        for node in range(node_offsets[i], node_offsets[i + 1]):
+            waiting -= 1
+            depth = stack[waiting]
+            depths[i] = max(depths[i], depth)
+            for _ in range(table.first_child[production[node]], table.first_child[production[node] + 1]):
+                stack[waiting] = depth + 1
+                waiting += 1
+    return depths
+
+
+@compiled
 def write_words(offsets: Int64s, choices: Codons, valid: Bools, table: Tables) -> tuple[Int64s, Int32s]:
     """Write the words every derivation consists of, by their numbers.
 

@@ -260,6 +260,12 @@ class Mapped:
         )
 
     @cached_property
+    def depths(self) -> Int32s:
+        """Depth of each derivation tree, in nonterminals from the start down (genomes,); 0 of an invalid one."""
+        room = np.empty(self.mapper.options.max_symbols, np.int32)
+        return derivation.tree_depths(self.node_offsets, self.nodes.production, self.mapper.tables, room)
+
+    @cached_property
     def symbols(self) -> Int32s:
         """The nonterminal each codon chose for, laid out as `choices`."""
         return self.nodes.symbol[self.mapper.tables.reads[self.nodes.symbol]]

@@ -1,6 +1,6 @@
 """The checkpoint: an evolution's state as plain bytes, with a checksum, and nothing that could be executed.
 
-A line ``gecar checkpoint 3 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
+A line ``gecar checkpoint 4 <sha256 of all that follows>``, a line of JSON with whole numbers and the arrays' rows,
 and the arrays one after the other, little-endian, in the order of `_layout`; the lineage is packed by zlib.
 """
 
@@ -22,7 +22,7 @@ from gecar.evolution.state import State
 from gecar.search.fitness import score_type
 
 _MAGIC = b"gecar checkpoint "
-_VERSION = b"3"
+_VERSION = b"4"
 
 
 def pack(state: State, configuration: str) -> bytes:

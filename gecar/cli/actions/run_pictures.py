@@ -20,6 +20,7 @@ from gecar.plots.runs.convergence import Reference, convergence
 from gecar.plots.runs.derivation_tree import tree_of
 from gecar.plots.runs.evolution_film import Champion, film_evolution
 from gecar.plots.runs.genealogy import genealogy
+from gecar.plots.runs.population import population_figure
 from gecar.plots.style import save
 from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
 from gecar.report.runs import came_to, group_names, run_detail, run_title, summaries, summary_table
@@ -81,9 +82,11 @@ def draw_drives(drives: Sequence[CourseDrive], target: Path, kind: str = "unseen
 
 
 def study_run(folder: Path, out: Path | None = None) -> list[Path]:
-    """Draw all of a run's pictures: those of `draw_run`, its best program's derivation, and who that descends from."""
+    """Draw all of a run's pictures: of `draw_run`, its populations, its best program's derivation and ancestors."""
     target = out or folder
     drawn = draw_run(folder, target)
+    if "size" in read_history(folder):
+        drawn.append(draw_population(folder, target / "population.png"))
     if read_result(folder)["program"]:
         drawn += [
             draw_tree(folder, target / "tree.png"),
@@ -98,6 +101,13 @@ def draw_convergence(folder: Path, target: Path) -> Path:
     title, detail = run_title(config, result), run_detail(config, result)
     winner = Reference(arriving(share_of(result)), result["fitness_s"]) if result["solved"] else None
     return save(convergence(history, references(config), title, detail, winner), target)
+
+
+def draw_population(folder: Path, target: Path) -> Path:
+    """Draw the size, depth and diversity of a run's populations."""
+    config, result = read_run_config(folder), read_result(folder)
+    title, detail = "Size, depth and diversity of the populations", run_detail(config, result)
+    return save(population_figure(read_history(folder), config.search.population, title, detail), target)
 
 
 def draw_trajectory(folder: Path, target: Path) -> Path:
