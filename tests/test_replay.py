@@ -153,3 +153,23 @@ def test_robots_told_at_other_times_are_replayed_apart() -> None:
     errors = np.nan_to_num(replayer_of(driven(steps, waves), memory_s=1.0).errors(physics))
     assert (errors[::2] == errors[0]).all()
     assert len(np.unique(errors, axis=0)) == 3
+
+
+def test_yaw_rates_do_not_jump_as_the_log_s_clock_changes() -> None:
+    replayer = replayer_of(driven(waves, steps))
+    own, *others = (
+        replayer.play(EV3.with_effects({"clock_skew": {"rate": rate}}).physics).rows[:, 3]
+        for rate in (0.0, 1e-9, -1e-9)
+    )
+    assert np.abs(np.diff(own)).max() > 0.05
+    for other in others:
+        np.testing.assert_allclose(other, own, atol=1e-4)
+
+
+def test_a_yaw_rate_is_that_of_its_moment() -> None:
+    recording = driven(waves, steps)
+    rate = replayer_of(recording).play(EV3.physics, np.array([1.0, 0.5, 0.3])).rows[:, 3]
+    turned = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.01)
+    np.testing.assert_allclose(
+        turned, np.unwrap(recording.heading_rad)[1:] - recording.heading_rad[0], atol=2e-3
+    )

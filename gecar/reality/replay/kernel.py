@@ -69,10 +69,10 @@ TIMING = ("clock_skew", "actuation_delay", "pose_delay", "duty_cap")
 
 _ROW = (
     "left_error right_error battery_error yaw_error "
-    "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside"
+    "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside yaw_before"
 )
 ROW = np.dtype([(field, np.float64) for field in _ROW.split()])
-"""Normalised residuals at a row, and what is predicted there, in the order of the columns above."""
+"""Normalised residuals at a row; what is predicted there, in the order of the columns above; yaw rate a step ago."""
 
 _OF_ROW = N_FIELDS + len(FILTER.descr)
 _OF_POSE = _OF_ROW + len(ROW.descr)
@@ -105,7 +105,6 @@ def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
     r.left_angle = s.left_angle - s.left_speed * back
     r.right_angle = s.right_angle - s.right_speed * back
     r.battery = supply(s, p)
-    r.yaw_rate = s.yaw_rate
     r.x = s.x - p.com_ahead * s.cos - (s.vx + s.yaw_rate * p.com_ahead * s.sin) * back
     r.y = s.y - p.com_ahead * s.sin - (s.vy - s.yaw_rate * p.com_ahead * s.cos) * back
     r.heading = s.heading - s.yaw_rate * back
@@ -119,8 +118,8 @@ def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
 def _compare_row(i: int, back: float, inputs: KernelInput, weights: Array, flat: Array, lanes: int) -> None:
     """Predict and compare at a row, and draw the wheel angles towards it; ``weights`` as in `_weigh`."""
     measured, sd = inputs.measured, inputs.sd
-    left, right, battery, yaw = measured[i, 0], measured[i, 1], measured[i, 2], measured[i, 3]
-    angle_sd, battery_sd, yaw_sd = sd[0], sd[1], sd[2]
+    left, right, battery = measured[i, 0], measured[i, 1], measured[i, 2]
+    angle_sd, battery_sd = sd[0], sd[1]
     left_weight, right_weight = weights[0], weights[1]
     endless = math.isinf(inputs.memory)
     for lane in range(lanes):
@@ -131,11 +130,50 @@ def _compare_row(i: int, back: float, inputs: KernelInput, weights: Array, flat:
         r.left_error = (left - r.left_angle) / angle_sd
         r.right_error = (right - r.right_angle) / angle_sd
         r.battery_error = (battery - r.battery) / battery_sd
-        r.yaw_error = (yaw - r.yaw_rate) / yaw_sd
         if not endless:
             s.left_angle += 0.0 if math.isnan(r.left_error) else r.left_error * angle_sd / left_weight
             s.right_angle += 0.0 if math.isnan(r.right_error) else r.right_error * angle_sd / right_weight
         store_state(flat, lanes, lane, s)
+        _store_row(flat, lanes, lane, r)
+
+
+@kernel
+def _compare_yaw_rates(
+    i: int,
+    now: float,
+    dt: float,
+    stretch: float,
+    inputs: KernelInput,
+    kept: Kept,
+    flat: Array,
+    lanes: int,
+    off: float,
+) -> int:
+    """Predict, compare and keep the yaw rates of rows from ``i`` up to half a step ago; return the row after them.
+
+    Velocities are those of the middle of a step, and between two middles a line. Taken as they are, rows on the edge of
+    two steps would jump from one to the other as a clock is a little faster or slower. Terms add ``off`` to each.
+    """
+    while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now - 0.5 * dt + 1e-9:
+        share = 1.5 - (now - inputs.t[i] * stretch) / dt
+        for lane in range(lanes):
+            s = load_state(flat, lanes, lane)
+            r = _load_row(flat, lanes, lane)
+            rate = r.yaw_before + share * (s.yaw_rate - r.yaw_before) + off
+            kept.row_errors[i, 3 * lanes + lane] = (inputs.measured[i, 3] - rate) / inputs.sd[2]
+            if kept.rows.shape[0] > 0:
+                kept.rows[i, YAW_RATE * lanes + lane] = rate
+        i += 1
+    return i
+
+
+@kernel
+def _remember_yaw(flat: Array, lanes: int) -> None:
+    """Keep every lane's yaw rate for the step after the next."""
+    for lane in range(lanes):
+        s = load_state(flat, lanes, lane)
+        r = _load_row(flat, lanes, lane)
+        r.yaw_before = s.yaw_rate
         _store_row(flat, lanes, lane, r)
 
 
@@ -224,12 +262,11 @@ def _keep(flat: Array, first: int, predicted: Array, errors: Array, row: int) ->
 
 @kernel
 def _off(flat: Array, laws: Any, stores: Any, off: Array) -> None:
-    """Set what terms add to a row's left angle, right angle, battery and yaw rate, shape (4,)."""
+    """Set what terms add to a row's left angle, right angle and battery, shape (3,) of the four."""
     s, p = load_state(flat, 1, 0), load_physics(flat, 1, 0)
     off[0] = reading_error(PORT_ENCODER, 0, s, p, laws)
     off[1] = reading_error(PORT_ENCODER, 1, s, p, laws)
     off[2] = stores.supply_voltage
-    off[3] = reading_error(PORT_GYRO, 0, s, p, laws)
 
 
 @kernel
@@ -239,6 +276,12 @@ def _pose_off(flat: Array, laws: Any, off: Array) -> None:
     off[0] = reading_error(PORT_POSE_X, 0, s, p, laws)
     off[1] = reading_error(PORT_POSE_Y, 0, s, p, laws)
     off[2] = reading_error(PORT_POSE_HEADING, 0, s, p, laws)
+
+
+@kernel
+def _yaw_off(flat: Array, laws: Any) -> float:
+    """Return what terms add to a row's yaw rate."""
+    return reading_error(PORT_GYRO, 0, load_state(flat, 1, 0), load_physics(flat, 1, 0), laws)
 
 
 @kernel
@@ -277,7 +320,7 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
         stretch = 1.0 / (1.0 + shared.clock_skew)
         late = shared.pose_delay + offset
         before = 0.0
-        i = j = n = 0
+        i = j = g = n = 0
         at = -1
         off = weights[4:]
         while True:
@@ -285,13 +328,16 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
             while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
                 if terms:
                     _off(flat, shared, stores[0], off)
-                    _shift(inputs.measured, i, 4, off, -1.0)
+                    _shift(inputs.measured, i, 3, off, -1.0)
                 _weigh(i, inputs, weights)
                 _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes)
                 _keep(flat, _OF_ROW * lanes, kept.rows, kept.row_errors, i)
                 if terms and kept.rows.shape[0] > 0:
-                    _shift(kept.rows, i, 4, off, 1.0)
+                    _shift(kept.rows, i, 3, off, 1.0)
                 i += 1
+            g = _compare_yaw_rates(
+                g, now, dt, stretch, inputs, kept, flat, lanes, _yaw_off(flat, shared) if terms else 0.0
+            )
             while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
                 back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if n > 0 else 0.0
                 if terms:
@@ -303,7 +349,7 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
                     _shift(kept.poses, j, 3, off, 1.0)
                 before = inputs.pose_t[j]
                 j += 1
-            if (i == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
+            if (g == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
                 return
             # Velocities live at mid-step: commands from the last middle to this one, less delay, on the log's clock.
             begin = ((n - 0.5) * dt - delay) / stretch
@@ -313,6 +359,7 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
             share = stretch / dt
             left = _held(inputs.commands, inputs.t, 0, at, begin, end, cap) * share
             right = _held(inputs.commands, inputs.t, 1, at, begin, end, cap) * share
+            _remember_yaw(flat, lanes)
             if terms:
                 _advance_with_terms(left, right, inputs.bench, shared, stores[0], flat)
             else:
