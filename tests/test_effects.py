@@ -101,6 +101,19 @@ def test_gain_differs_by_direction():
     assert settled(robot, 0.6, -0.6) == pytest.approx([steady(0.66), -steady(0.54)], rel=1e-6)
 
 
+def test_viscous_friction_differs_by_direction():
+    robot = with_effect("viscous_asymmetry", ICE, forward_minus_backward_nms=0.01)
+    expected = steady(0.6, viscous=0.005), -steady(0.6, viscous=-0.005)
+    assert settled(robot, 0.6, -0.6) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_constant_torque_helps_one_way_and_is_held_by_friction_at_rest():
+    robot = with_effect("constant_torque", ICE, torque_nm=0.01)
+    expected = steady(0.6, torque=FRICTION - 0.01), -steady(0.6, torque=FRICTION + 0.01)
+    assert settled(robot, 0.6, -0.6) == pytest.approx(expected, rel=1e-6)
+    assert not moves(robot, 0.0)
+
+
 def test_backlash_lets_the_encoder_turn_before_the_robot_moves():
     history = run(hold(0.3, 0.3, 1.0), with_effect("backlash", angle_deg=6.0))
     moving = np.argmax(history["vx"] > 1e-4)
@@ -120,6 +133,37 @@ def test_a_dead_band_gives_nothing_inside_and_takes_its_offset_off_outside():
     robot = with_effect("dead_band", ICE, duty_pct=30.0, offset_share=0.5)
     assert not moves(robot, 0.29)
     assert settled(robot) == pytest.approx(steady(0.45), rel=1e-6)
+
+
+def test_dead_bands_differ_by_motor_and_direction():
+    dead = with_effect("dead_band", ICE, duty_pct=20.0, offset_share=1.0)
+    robot = with_effect(
+        "dead_band_asymmetry", dead, right_minus_left_pct=10.0, forward_minus_backward_pct=4.0
+    )
+    assert settled(robot, 0.6, 0.6) == pytest.approx([steady(0.43), steady(0.33)], rel=1e-6)
+    assert settled(robot, -0.6, -0.6) == pytest.approx([-steady(0.47), -steady(0.37)], rel=1e-6)
+
+
+def test_a_dead_band_is_no_narrower_than_none():
+    robot = with_effect("dead_band_asymmetry", ICE, right_minus_left_pct=20.0)
+    assert settled(robot) == pytest.approx([steady(0.6), steady(0.5)], rel=1e-6)
+
+
+@pytest.mark.parametrize("bulge", [-0.5, 4.0])
+def test_a_drivers_curve_bends_between_none_and_full_duty(bulge):
+    robot = with_effect("duty_curve", ICE, bulge=bulge)
+    bent = steady(0.6 * (1.0 + bulge) / (1.0 + 0.6 * bulge))
+    assert settled(robot, 0.6, -0.6) == pytest.approx([bent, -bent], rel=1e-6)
+    assert settled(robot, 1.0, -1.0) == pytest.approx([steady(1.0), -steady(1.0)], rel=1e-6)
+
+
+def test_a_current_limit_bounds_the_torque_at_the_start_and_when_braking():
+    robot = with_effect("current_limit", ICE, current_a=0.3)
+    history = run(np.concatenate([hold(0.8, 0.8, 2.0), hold(-0.8, -0.8, 0.1)]), robot)
+    pace = np.diff(history["left_speed"]) / DT
+    assert pace[1:30] == pytest.approx((KT * 0.3 - FRICTION) / MOTOR.inertia, rel=0.02)
+    assert pace[1005:1030] == pytest.approx(-(KT * 0.3 + FRICTION) / MOTOR.inertia, rel=0.02)
+    assert history["left_speed"][999] == pytest.approx(steady(0.8), rel=0.01)
 
 
 def test_full_duty_gives_more_and_less_does_not():

@@ -53,14 +53,24 @@ _READINGS: Mapping[str, Reading] = {
     "stribeck_speed": Reading("gone at", "deg/s", _times(1.0 / DEG)),
     "friction_ratio": Reading("friction forward above backward", "%", _times(200.0)),
     "direction_gain": Reading("power forward above backward", "%", _times(200.0)),
+    "viscous_difference": Reading(
+        "torque at 100 turns a minute forward above backward", "mN m", _times(1e3 * 100.0 * RPM)
+    ),
+    "constant_torque": Reading("torque forward", "mN m", _MNM),
     "backlash": Reading("play", "deg", _times(1.0 / DEG)),
     "dead_band": Reading("no torque below", "% duty", _PCT),
     "dead_band_offset": Reading("lost above it, too", "%", _PCT),
+    "dead_band_right": Reading("right motor's dead band wider by", "% duty", _PCT),
+    "dead_band_forward": Reading("dead band forward wider by", "% duty", _PCT),
+    "duty_bulge": Reading(
+        "voltage at 50 % duty", "% of full", lambda v, _: 50.0 * (1.0 + v) / (1.0 + 0.5 * v)
+    ),
     "full_duty_gain": Reading("more at full duty", "%", _PCT),
     "inertia_scale": Reading("inertia", "kg cm²", _of("inertia", 1e4)),
     "actuation_delay": Reading("delay", "ms", _MS),
     "start_latency": Reading("wait at the start", "ms", _MS),
     "command_slew": Reading("from 0 to 100 % in", "ms", lambda v, _: 1e3 / v if v else math.inf),
+    "current_limit": Reading("most current", "A"),
     "gain_difference": Reading("right motor stronger by", "%", _PCT),
     "supply_scale": Reading("battery", "V", _of("voltage", 1.0)),
     "battery_resistance": Reading("volts lost for each ampere", "V"),

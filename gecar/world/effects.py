@@ -109,7 +109,8 @@ class Effect:
     source
         Where the law and the bounds come from.
     needs
-        What recordings must have to show it: ``floor``, ``pose``, ``two motors``, ``both directions``, ``full duty``.
+        What recordings must have to show it: ``floor``, ``bench``, ``pose``, ``two motors``, ``both directions``,
+        ``full duty``.
     starts
         Values identification starts from, by label; () where they are scanned, or a few sizes on both sides of
         neutral will do.
@@ -181,6 +182,14 @@ CATALOGUE: tuple[Effect, ...] = (
             _P("direction_gain", "gain_ratio", "-", -0.3, 0.3, 0.0, 0.005)),
            ("motor",), "sign of the speed", _EV3_FITS,
            needs=("both directions",)),
+    Effect("viscous_asymmetry", "friction grows with speed more in one direction",
+           (_P("viscous_difference", "forward_minus_backward_nms", "N m s/rad", -0.03, 0.03, 0.0, 0.0004),),
+           ("motor",), "high speed, by its sign", "torque = -difference / 2 x |speed|; the EMPS drive has it",
+           needs=("both directions",)),
+    Effect("constant_torque", "a constant torque acts on the shafts",
+           (_P("constant_torque", "torque_nm", "N m", -0.12, 0.12, 0.0, 0.002),),
+           ("motor",), "both directions, at any speed", "offset of the EMPS drive: Janot, Gautier, Brunot, 2019",
+           needs=("bench",)),
     Effect("backlash", "backlash in the gears",
            (_P("backlash", "angle_deg", "deg", 0.0, 25.0, 0.0, 0.8, DEG, model_error=0.12, model_error_steps=0.6),),
            ("motor", "pose"), "reversals: the encoder turns, the robot waits",
@@ -193,6 +202,15 @@ CATALOGUE: tuple[Effect, ...] = (
            scan="duty levels", search=Search(),
            # friction holds 4 % of an EV3's duty anyway: a threshold without an offset must exceed it
            worth=({"duty_pct": 1.0, "offset_share": 0.3}, {"duty_pct": 5.0})),
+    Effect("dead_band_asymmetry", "the small duty that gives no torque differs by motor or direction",
+           (_P("dead_band_right", "right_minus_left_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01),
+            _P("dead_band_forward", "forward_minus_backward_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01)),
+           ("motor",), "small duty, by motor or sign", "a micromouse: 26-29 % of duty and 16-20 %",
+           needs=("both directions",)),
+    Effect("duty_curve", "the motor driver's voltage is not proportional to duty",
+           (_P("duty_bulge", "bulge", "-", -0.6, 6.0, 0.0, 0.02),),
+           ("motor",), "duty between 0 and 100 %",
+           "duty x (1 + bulge) / (1 + bulge |duty|), empirical: bridges in which current decays fast"),
     Effect("full_duty", "full duty gives more than the duties below it would say",
            (_P("full_duty_gain", "gain", "-", -0.1, 0.2, 0.0, 0.005),),
            ("motor",), "duty of 100 %", "a bridge that need not switch loses no dead time; two EV3 motors: 1 % faster",
@@ -212,6 +230,10 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("command_slew", "rate_pct_s", "%/s", 30.0, math.inf, math.inf, 0.0, 0.01, 500.0),),
            ("motor",), "big steps", "rate limiter on duty",
            starts=_values("rate_pct_s", 1500.0, 600.0, 250.0, 100.0)),
+    Effect("current_limit", "the motor driver limits the current",
+           (_P("current_limit", "current_a", "A", 0.05, math.inf, math.inf, 0.0, 1.0, 1.0),),
+           ("motor",), "from rest, reversals, stall", "current chopping of PWM drivers",
+           scan="shares of stall current"),
     Effect("motor_gain_asymmetry", "one motor is stronger than the other",
            (_P("gain_difference", "right_minus_left", "-", -0.4, 0.4, 0.0, 0.005),),
            ("motor",), "straight runs curve; the encoders show it", _EV3_FITS,

@@ -167,8 +167,11 @@ class Robot(_Section):
         if parameter.field == "com_ahead":  # between the axle and the caster, or the robot falls over
             short_of_caster = self.body.caster_ahead - math.copysign(0.001, self.body.caster_ahead)
             return min(round(short_of_caster, 6), 0.0), max(round(short_of_caster, 6), 0.0)
-        # Bounds on torques are an EV3's; a larger drive has larger ones.
-        return parameter.low, math.inf if parameter.unit.startswith("N m") else parameter.high
+        if parameter.unit.startswith(
+            "N m"
+        ):  # Bounds on torques are an EV3's; a larger drive has larger ones.
+            return -math.inf if parameter.low < 0.0 else parameter.low, math.inf
+        return parameter.low, parameter.high
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Robot:
         """Return this robot with effects added or replaced.

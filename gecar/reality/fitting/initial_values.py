@@ -99,13 +99,13 @@ def _slow_speeds(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Valu
 
     Where no shaft was recorded turning, any speed will do.
     """
-    top = max(_top_speed(r) for r in recordings) or math.inf
+    top = max(top_speed(r) for r in recordings) or math.inf
     for speed, share in ((0.3, 0.25), (1.0, 0.5), (3.0, 1.0)):
         for torque in (0.005, 0.02):
             yield {"extra_torque_nm": torque * torque_scale(robot), "speed_rad_s": min(speed, share * top)}
 
 
-def _top_speed(recording: Recording) -> float:
+def top_speed(recording: Recording) -> float:
     """Return the fastest a shaft turned over `SPEED_OVER_S` [rad/s]."""
     every = max(int(np.searchsorted(recording.t_s, recording.t_s[0] + SPEED_OVER_S)), 1)
     angles, t = _wheel_angles(recording)[::every], recording.t_s[::every]
@@ -234,6 +234,12 @@ def _top_speeds(robot: Robot) -> Iterator[Values]:
         yield {"speed_rad_s": max(share * top, BY_ID["speed_limit"].parameters[0].low)}
 
 
+def _currents(robot: Robot) -> Iterator[Values]:
+    stall = robot.battery.voltage / robot.motor.resistance * robot.drive.duty_cap
+    for share in (0.8, 0.6, 0.4, 0.2):
+        yield {"current_a": max(share * stall, BY_ID["current_limit"].parameters[0].low)}
+
+
 def _mounts(robot: Robot) -> Iterator[Values]:
     sensor = robot.colour_sensor
     for ahead in (-0.02, -0.01, 0.0, 0.01, 0.02):
@@ -247,6 +253,7 @@ _SCANS: dict[str, Scan] = {
     "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
     "shaft cycles": _shaft_cycles,
     "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
+    "shares of stall current": lambda robot, recordings, errors: _currents(robot),  # noqa: ARG005
     "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot),  # noqa: ARG005
     "around the mount": lambda robot, recordings, errors: _mounts(robot),  # noqa: ARG005
 }

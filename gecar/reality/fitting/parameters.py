@@ -66,7 +66,7 @@ class Coordinate:
             return p.neutral or math.inf if z <= 0.0 else max((p.start or p.low) / z, p.low)
         if self.ratio:
             return min(max(self.neutral * math.exp(z), p.low), p.high)
-        return min(max(self.neutral + z * self.step, p.low), p.high * self.scale)
+        return min(max(self.neutral + z * self.step, p.low * self.scale), p.high * self.scale)
 
     def at(self, value: float) -> float:
         """Return the coordinate of a value."""
@@ -79,7 +79,8 @@ class Coordinate:
     @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest coordinate."""
-        ends = [self.at(max(self.parameter.low, _FAR_LOW) if self.ratio else self.parameter.low)]
+        low = self.parameter.low * self.scale
+        ends = [self.at(max(low, _FAR_LOW) if self.ratio else low)]
         ends.append(self.at(self.parameter.high * self.scale))
         return min(ends), max(ends)
 

@@ -30,6 +30,7 @@ def _available(residuals: Residuals) -> set[str]:
     duties = np.concatenate([r.commands.ravel() for r in recordings])
     found = {
         "floor": any(r.setup.rig != "bench" for r in recordings),
+        "bench": all(r.setup.rig == "bench" for r in recordings),
         "pose": any(r.replayer.has_poses for r in residuals.recordings),
         "two motors": any(
             not np.isnan(r.left_duty).all() and not np.isnan(r.right_duty).all() for r in recordings

@@ -27,6 +27,7 @@ from gecar.world.kernel.motor import (
     slewed,
     supply,
     turn_bare_shafts,
+    within_current,
 )
 from gecar.world.kernel.series import small_cosine, small_sine
 from gecar.world.kernel.state import roll_on
@@ -37,9 +38,10 @@ STILL = 1e-15  # m/s and rad/s
 _EFFECT_FIELDS = (
     "tilt_x", "tilt_y", "regulated", "start_latency", "dead_band", "direction_gain",
     "full_duty_gain", "ripple_amplitude", "static_friction", "friction_ratio", "rolling_resistance", "patch_radius",
-    "caster_friction", "battery_drain", "battery_resistance", "backlash",
+    "caster_friction", "battery_drain", "battery_resistance", "backlash", "viscous_difference", "constant_torque",
+    "dead_band_right", "dead_band_forward", "duty_bulge",
 )  # fmt: skip
-_EFFECT_LIMITS = ("command_slew", "speed_limit")
+_EFFECT_LIMITS = ("command_slew", "speed_limit", "current_limit")
 
 
 def is_plain(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
@@ -234,8 +236,11 @@ def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, eff
         left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
         right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
     s.left_duty, s.right_duty = left_duty, right_duty
-    s.left_drive = effective_duty(left_duty, c.left_gain, p, effects)
-    s.right_drive = effective_duty(right_duty, c.right_gain, p, effects)
+    s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
+    s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
+    if effects:
+        s.left_drive = within_current(s.left_drive, s.voltage, s.left_speed, p)
+        s.right_drive = within_current(s.right_drive, s.voltage, s.right_speed, p)
     s.left_speed = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, effects)
     right_angle = s.right_angle + p.ripple_lead
     s.right_speed = conduct(s.right_drive, s.voltage, right_angle, s.right_speed, p, c, effects)

@@ -29,6 +29,8 @@ def conduct(
         return driven
     if c.ripple != 0.0:
         driven += c.ripple * sine(p.ripple_cycles * angle + p.ripple_phase)
+    if c.torque != 0.0 or c.lean != 0.0:
+        driven += c.torque - c.lean * abs(speed)
     # Firmware may take power away to hold the limit, not reverse it.
     driven = min(driven, max(p.speed_limit, free))
     return max(driven, min(-p.speed_limit, free))
@@ -43,17 +45,32 @@ def awake(duty: float, t: float, p: Any, c: Any) -> float:
 
 
 @kernel
-def effective_duty(duty: float, gain: float, p: Any, effects: bool = True) -> float:
-    """Return the share of the supply that reaches a motor: dead band, gain by side and direction, full duty's own."""
+def effective_duty(duty: float, gain: float, dead: float, p: Any, effects: bool = True) -> float:
+    """Return the share of the supply that a driver gives a motor of a gain and a dead band.
+
+    Besides these: what differs by direction, the driver's curve, and full duty's own gain.
+    """
     if not effects:
         return duty * gain
-    if abs(duty) < p.dead_band:
+    threshold = max(dead + math.copysign(0.5 * p.dead_band_forward, duty), 0.0)
+    if abs(duty) < threshold:
         return 0.0
-    past = duty - math.copysign(p.dead_band * p.dead_band_offset, duty)
+    past = duty - math.copysign(threshold * p.dead_band_offset, duty)
+    if p.duty_bulge != 0.0:
+        past *= (1.0 + p.duty_bulge) / (1.0 + p.duty_bulge * abs(past))
     direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
     if abs(duty) >= FULL_DUTY:
         past *= 1.0 + p.full_duty_gain
     return past * gain * direction
+
+
+@kernel
+def within_current(drive: float, voltage: float, speed: float, p: Any) -> float:
+    """Return the share of the supply that keeps a motor's current, |drive V - Ke w| / R, within the driver's limit."""
+    if p.current_limit < math.inf:
+        back, reach = p.back_emf_constant * speed / voltage, abs(p.current_limit * p.resistance / voltage)
+        drive = min(max(drive, back - reach), back + reach)
+    return drive
 
 
 @kernel
@@ -158,8 +175,10 @@ def turn_bare_shafts(
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
     s.left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
     s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
-    s.left_drive = effective_duty(s.left_duty, c.left_gain, p)
-    s.right_drive = effective_duty(s.right_duty, c.right_gain, p)
+    left = effective_duty(s.left_duty, c.left_gain, c.left_dead, p)
+    right = effective_duty(s.right_duty, c.right_gain, c.right_dead, p)
+    s.left_drive = within_current(left, s.voltage, s.left_speed, p)
+    s.right_drive = within_current(right, s.voltage, s.right_speed, p)
     right_angle = s.right_angle + p.ripple_lead
     s.left_speed = bare_shaft(
         s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, left_torque, left_friction

@@ -23,7 +23,7 @@ _STATE_FIELDS = (
 )
 _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
-    "drive_gain keep left_gain right_gain slew "
+    "drive_gain keep left_gain right_gain left_dead right_dead slew torque lean "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
     "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
 )
@@ -60,6 +60,8 @@ def derive(p: Any, dt: float, c: Any) -> None:
     _rotor(p, dt, c)
     c.left_gain = 1.0 - 0.5 * p.gain_difference
     c.right_gain = 1.0 + 0.5 * p.gain_difference
+    c.left_dead = p.dead_band - 0.5 * p.dead_band_right
+    c.right_dead = p.dead_band + 0.5 * p.dead_band_right
     c.slew = p.command_slew * dt
     c.weight = p.mass * GRAVITY
     c.caster_static = c.weight * p.com_ahead / p.caster_ahead
@@ -70,6 +72,8 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.tilt_y = GRAVITY * math.sin(p.tilt_y) * dt
     c.sliding = p.coulomb_friction * dt
     c.ripple = p.ripple_amplitude * dt / c.rotor
+    c.torque = p.constant_torque * dt / c.rotor
+    c.lean = 0.5 * p.viscous_difference * dt / c.rotor
     roll_on(p, 0.0, 0.0, c)
 
 

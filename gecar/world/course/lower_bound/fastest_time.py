@@ -26,6 +26,7 @@ from gecar.world.kernel.motor import FULL_DUTY
 from gecar.world.kernel.state import GRAVITY
 from gecar.world.robot import Robot
 
+LEAST_DAMPING = 1e-9  # N m s/rad
 _LONGEST_S, _LONGEST_STEP_S = 3600.0, 0.01  # of a drive; gecar.world.rollout holds them
 
 
@@ -69,12 +70,13 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
         p["wheel_radius"] * p["radius_scale"] * (1.0 + s * abs(p["radius_difference"])) for s in (-0.5, 0.5)
     )
     damping = p["torque_constant"] * p["back_emf_constant"] / p["resistance"] + p["viscous_friction"]
+    damping = max(damping - 0.5 * abs(p["viscous_difference"]), LEAST_DAMPING)
     torque = p["torque_constant"] * _voltage(p, until_s) / p["resistance"]
     drag = p["coulomb_friction"] * (1.0 - abs(p["friction_ratio"]))
     tilt = math.hypot(math.sin(p["tilt_x"]), math.sin(p["tilt_y"]))
     track, behind = 0.5 * p["track_width"] * p["track_scale"], abs(p["com_ahead"])
     downhill = 0.5 * p["mass"] * GRAVITY * tilt * large * math.hypot(1.0, behind / track)
-    push = downhill + abs(p["ripple_amplitude"])
+    push = downhill + abs(p["ripple_amplitude"]) + abs(p["constant_torque"])
     grip = max(p["tyre_friction"], p["patch_friction"] if p["patch_radius"] > 0.0 else 0.0)
     # Unlike wheels: whatever the ground gives the larger as the outer one need not be paid back by the smaller.
     unlike = 0.5 * (large**2 - small**2) / damping * grip * p["mass"] * GRAVITY
@@ -87,8 +89,9 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
     free = push > 0.0 or unlike > 0.0
     holding = _holding(p, tilt)
     dead = 0.0 if free else max(p["actuation_delay"], p["start_latency"])
-    # A saturated regulator hides the half step that commands wait for velocities: the robot starts that much early.
-    early = 0.5 * _LONGEST_STEP_S if p["regulated"] else 0.0
+    # A saturated regulator hides the half step that commands wait for velocities, and a curve that gives more than half
+    # at half duty part of it: the robot starts that much early.
+    early = 0.5 * _LONGEST_STEP_S if p["regulated"] or p["duty_bulge"] > 0.0 else 0.0
     return Sprint(
         float(speed),
         math.inf if free else float(large * p["speed_limit"] * (1.0 + over)),
@@ -106,9 +109,10 @@ def _voltage(p: np.void, until_s: float) -> float:
     full = p["voltage"] * p["supply_scale"]
     supply = max(full, abs(full - p["battery_drain"] * until_s))
     cap = 1.0 if p["regulated"] else p["duty_cap"]  # a regulator may use the whole battery to hold its speed
-    if cap >= FULL_DUTY:
-        cap *= 1.0 + max(p["full_duty_gain"], 0.0)
-    return supply * cap * (1.0 + 0.5 * abs(p["gain_difference"])) * (1.0 + abs(p["direction_gain"]))
+    full = 1.0 + max(p["full_duty_gain"], 0.0) if cap >= FULL_DUTY else 1.0
+    bulge = max(p["duty_bulge"], 0.0)
+    curved = cap * (1.0 + bulge) / (1.0 + bulge * cap)
+    return supply * curved * full * (1.0 + 0.5 * abs(p["gain_difference"])) * (1.0 + abs(p["direction_gain"]))
 
 
 def _holding(p: np.void, tilt: float) -> float:
