@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gecar.reality.fitting.initial_values import top_speed
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import Size
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import spread_of_size
 from gecar.reality.selection.thresholds import (
+    BREAKAWAY_SPEED,
     COMPETING,
     LEAST_INVERSE,
     PRICE,
@@ -23,6 +25,7 @@ from gecar.world.effects import BY_ID
 
 Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
+BREAKAWAY = "static_friction"
 AT_BOUND = 0.01  # coordinates
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
 
@@ -48,12 +51,21 @@ def is_worthwhile(model: Model, effect: str) -> bool:
 
 def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     """Return the best steps of a stage that gain enough; on a bench, where nothing is noise, of sizes worth a name."""
+    stage = [step for step in stage if not imitates_dry_friction(problem, step.model)]
     if problem.on_bench:
         stage = [step for step in stage if step.worthwhile]
     best = max((step.gain for step in stage), default=0.0)
     return [
         step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best) and not stopped(step)
     ]
+
+
+def imitates_dry_friction(problem: Problem, model: Model) -> bool:
+    """Whether a model's breakaway friction lasts up to speeds at which it must have given way to sliding friction."""
+    if BREAKAWAY not in model.effects:
+        return False
+    fastest = max(map(top_speed, problem.recordings))
+    return model.values[BREAKAWAY]["speed_rad_s"] > BREAKAWAY_SPEED * fastest > 0.0
 
 
 def stopped(step: Step) -> bool:

@@ -12,7 +12,14 @@ from dataclasses import dataclass, replace
 
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.materiality import Size
-from gecar.reality.selection.acceptance import candidates, is_material, proved, steady, stopped
+from gecar.reality.selection.acceptance import (
+    candidates,
+    imitates_dry_friction,
+    is_material,
+    proved,
+    steady,
+    stopped,
+)
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
@@ -235,7 +242,7 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
         swapped = estimator.fit((*rest, other.effect), values)
         if swapped.cost < found.model.cost - found.null_95:
             step = judged(problem, step_of(estimator, other.effect, found.base, swapped))
-            if proved(step) and not stopped(step):
+            if proved(step) and not stopped(step) and not imitates_dry_friction(problem, swapped):
                 return step
     return None
 

@@ -108,6 +108,11 @@ CERTAIN = Threshold(2.5, "standard deviations of that loss beyond which it is ce
 
 # -- Size
 STOPPED = Threshold(8.0, "coordinates from neutral at which a fit that ends at a bound has not ended", "hand")
+BREAKAWAY_SPEED = Threshold(
+    0.6,
+    "share of the fastest recorded speed by which breakaway friction must have fallen to a third",
+    "Stribeck speeds are a few percent of a motor's top speed; EMPS: dry friction was taken for breakaway at 0.8",
+)
 LEAST_INVERSE = Threshold(0.02, "coordinate of a limit or rate worth naming", "hand")
 
 # -- What passes for the sensors' noise
