@@ -24,7 +24,7 @@ from gecar.plots.reality.replay_page import replay_page, replays_json
 from gecar.plots.reality.verdict import verdict_drawings, verdict_figures, verdict_tables
 from gecar.plots.style import is_whole
 from gecar.reality.compare.choices import Told, tell
-from gecar.reality.compare.side_by_side import PLACE, WHEELS, measure_of, typical
+from gecar.reality.compare.side_by_side import PLACE, WHEELS, Beside, Curves, measure_of, typical
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.verdict import Interval, Judgement, Place, Verdict
 from gecar.report.units import amount, quantities
@@ -115,7 +115,7 @@ def failed(verdict: Verdict) -> Verdict:
     return replace(verdict, robot=worse, judgement=Judgement(verdict.judgement.recordings, False, misfits))
 
 
-def test_the_number_is_what_the_simulation_is_off_by_at_the_end() -> None:
+def test_the_number_is_what_the_simulation_is_off_by_over_a_recording() -> None:
     verdict = verdict_on(*CASES["late"])
     shown = told("late").shown
     run = typical(shown, PLACE)
@@ -123,12 +123,21 @@ def test_the_number_is_what_the_simulation_is_off_by_at_the_end() -> None:
     assert run is not None
     assert run.set_aside
     x, y = run.curves["x"], run.curves["y"]
-    last = x.t_s >= x.t_s[-1] - 0.2
-    before = np.sqrt(np.mean(((x.measured - x.before) ** 2 + (y.measured - y.before) ** 2)[last]))
+    before = np.sqrt(np.mean((x.measured - x.before) ** 2 + (y.measured - y.before) ** 2))
     assert run.off(PLACE).before == pytest.approx(before)
     assert run.off(PLACE).after < 0.3 * run.off(PLACE).before
     assert run.off(PLACE).noise == pytest.approx(np.sqrt(2.0), rel=0.3)  # the camera's 1 mm along x and y
     assert f"<strong>{amount(float(before), 'mm')}</strong>" in first_screen(verdict, shown)
+
+
+def test_paths_that_cross_at_the_end_do_not_flatter_the_number() -> None:
+    t = np.linspace(0.0, 10.0, 501)
+    wrong = 50.0 * np.sin(np.pi * t / 10.0)  # mm; as good as nothing at the end
+    x, y = Curves(t, wrong, 0.0 * t, 0.1 * wrong), Curves(t, 0.0 * t, 0.0 * t, 0.0 * t)
+    run = Beside(
+        "run", True, 0.0, 10.0, {"x": x, "y": y}, dict.fromkeys(("x", "left_angle", "reflection"), 1.0)
+    )
+    assert run.off(PLACE)[:2] == pytest.approx([50.0 / np.sqrt(2.0), 45.0 / np.sqrt(2.0)], rel=0.01)
 
 
 def test_the_taken_effect_leaves_less_than_its_runners_up() -> None:

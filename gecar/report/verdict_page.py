@@ -12,13 +12,13 @@ from types import MappingProxyType
 
 from gecar.reality.compare.choices import Choice
 from gecar.reality.compare.side_by_side import (
-    END_S,
     PLACE,
     READING,
     UNITS,
     WHEELS,
     Beside,
     measure_of,
+    root_mean,
     side_by_side,
     typical,
 )
@@ -89,7 +89,7 @@ def the_number(verdict: Verdict, shown: Sequence[Beside]) -> str:
         return ""
     off, unit = run.off(measure), UNITS[measure]
     was, now, noise = (f"<strong>{_text(amount(v, unit))}</strong>" for v in off)
-    when = f"after {run.duration_s:.0f} s" if measure != READING else "on average"
+    when = f"over {run.duration_s - run.from_s:.0f} s (root mean square)"
     noise_words = f"{'the camera' if measure == PLACE else 'the sensor'}'s noise is {noise}"
     where = (
         f"<span class='soft'>{_text(run.name)}, not used for the fit{_turned(run, measure, verdict)}</span>"
@@ -106,8 +106,8 @@ def _turned(run: Beside, measure: str, verdict: Verdict) -> str:
     """Say the same in degrees where the number is in millimetres, and the other way round."""
     if measure == PLACE and "heading" in run.curves:
         one = run.curves["heading"]
-        late = one.t_s >= one.t_s[-1] - END_S
-        was, now = (abs(float((one.measured - s)[late].mean())) for s in (one.before, one.after))
+        told = one.t_s >= run.from_s
+        was, now = (root_mean((one.measured - s)[told]) for s in (one.before, one.after))
         unit = "deg"
     elif measure == WHEELS:
         mm = math.radians(1e3) * verdict.robot.body.wheel_radius

@@ -24,7 +24,6 @@ Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
 
 START_S = 1.0  # over which a simulation's start is fitted to the poses seen
-END_S = 0.2  # over which what a drive is off by at its end is averaged
 _DEG = 180.0 / np.pi
 PLACE, WHEELS, READING = "place", "wheels", "reading"
 UNITS = {PLACE: "mm", WHEELS: "deg", READING: "%"}
@@ -112,13 +111,15 @@ class Beside:
         return one.t_s, *np.sqrt(total)
 
     def off(self, measure: str) -> Off:
-        """Return what the simulations are off by over the last second; of a reading, over all of it."""
+        """Return what the simulations are off by, root mean square over all that was set aside.
+
+        Not at the end: paths of which one is wrong all along may cross there.
+        """
         t, before, after = self.apart(measure)
-        first = self.from_s if measure == READING else t[-1] - END_S
-        late = t >= max(first, self.from_s)
+        told = t >= self.from_s
         noise = {PLACE: np.sqrt(2.0) * self.noise["x"], READING: self.noise["reflection"]}
         of_wheel = self.noise["left_angle"]
-        return Off(root_mean(before[late]), root_mean(after[late]), float(noise.get(measure, of_wheel)))
+        return Off(root_mean(before[told]), root_mean(after[told]), float(noise.get(measure, of_wheel)))
 
 
 def measure_of(verdict: Verdict) -> str:
