@@ -45,6 +45,7 @@ from gecar.reality.selection.stepwise import Explanation, explain
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
+from gecar.reality.uncertainty.valleys import along_valleys, valleys
 from gecar.reality.verdict import (
     Found,
     Interval,
@@ -214,6 +215,9 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             motion.explained.problem.clocks_fitted,
             where.doubted,
             [step.effect for stage in stages for step in stage.candidates],
+            valleys(motion.explained.problem, motion.explained.taken)
+            if motion.explained.problem.on_bench
+            else (),
         ),
         evidence=Evidence(
             motion.explained,
@@ -306,6 +310,8 @@ def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
             if explained.minor:
                 small = intervals(explained.problem.estimator, explained.whole, context.seed)
                 spans = {**small, **spans}
+            if explained.steps and explained.problem.on_bench:
+                spans = along_valleys(explained.problem, explained.taken, spans)
             return _Stage(explained, candidates, spans)
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)

@@ -49,6 +49,8 @@ class Parameter:
     model_error, model_error_steps
         How far a fitted value may be off because the simulation is not reality: as a share of its size, and in
         sizes worth a name. Measured against a 3D engine; gears that give add to their play 0.3 to 0.8 degrees there.
+    differs
+        Standard deviation over motors of one kind and batteries, in that unit; 0: no more than a name is worth.
     """
 
     field: str
@@ -65,6 +67,7 @@ class Parameter:
     search_spread: float = 1.0
     model_error: float = 0.02
     model_error_steps: float = 0.15
+    differs: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -167,10 +170,10 @@ _SENSOR = "first-order sensor; white 50-98 %, black 2-10 % on real EV3 colour se
 
 CATALOGUE: tuple[Effect, ...] = (
     Effect("coulomb_friction", "dry friction in the gearbox",
-           (_P("coulomb_friction", "torque_nm", "N m", 0.0, 0.12, None, 0.002),),
+           (_P("coulomb_friction", "torque_nm", "N m", 0.0, 0.12, None, 0.002, differs=0.006),),
            ("motor",), "low speed, reversals, small duty", _LAW_MOTOR),
     Effect("viscous_friction", "friction growing with speed",
-           (_P("viscous_friction", "coefficient_nms", "N m s/rad", 0.0, 0.03, 0.0, 0.0004),),
+           (_P("viscous_friction", "coefficient_nms", "N m s/rad", 0.0, 0.03, 0.0, 0.0004, differs=0.002),),
            ("motor",), "high speed", _LAW_MOTOR),
     Effect("static_friction", "breakaway friction above sliding friction",
            (_P("static_friction", "extra_torque_nm", "N m", 0.0, 0.12, 0.0, 0.003),
@@ -189,7 +192,7 @@ CATALOGUE: tuple[Effect, ...] = (
     Effect("constant_torque", "a constant torque acts on the shafts",
            (_P("constant_torque", "torque_nm", "N m", -0.12, 0.12, 0.0, 0.002),),
            ("motor",), "both directions, at any speed", "offset of the EMPS drive: Janot, Gautier, Brunot, 2019",
-           needs=("bench",)),
+           needs=("bench", "both directions")),
     Effect("backlash", "backlash in the gears",
            (_P("backlash", "angle_deg", "deg", 0.0, 25.0, 0.0, 0.8, DEG, model_error=0.12, model_error_steps=0.6),),
            ("motor", "pose"), "reversals: the encoder turns, the robot waits",
@@ -216,7 +219,7 @@ CATALOGUE: tuple[Effect, ...] = (
            ("motor",), "duty of 100 %", "a bridge that need not switch loses no dead time; two EV3 motors: 1 % faster",
            needs=("full duty",)),
     Effect("rotor_inertia", "the motors are slower or quicker to speed up",
-           (_P("inertia_scale", "scale", "-", 0.2, 4.0, 1.0, 0.05),),
+           (_P("inertia_scale", "scale", "-", 0.2, 4.0, 1.0, 0.05, differs=0.15),),
            ("motor",), "steps", "rests on an estimated acceleration of the EV3 motor: calibrate it"),
     Effect("actuation_delay", "commands act late",
            (_P("actuation_delay", "time_s", "s", 0.0, 0.25, 0.0, 0.005),),
@@ -239,8 +242,8 @@ CATALOGUE: tuple[Effect, ...] = (
            ("motor",), "straight runs curve; the encoders show it", _EV3_FITS,
            needs=("two motors",)),
     Effect("supply_voltage", "the battery's level differs",
-           (_P("supply_scale", "scale", "-", 0.5, 1.3, 1.0, 0.005),),
-           ("motor",), "all speeds", "6.0-9.0 V over an EV3 battery's charge"),
+           (_P("supply_scale", "scale", "-", 0.6, 1.2, 1.0, 0.005, differs=0.08),),
+           ("motor",), "all speeds", "6.0-9.0 V over an EV3 battery's charge, 9.6 V fresh; never 10.8 V"),
     Effect("battery_resistance", "the battery's voltage sags under load",
            (_P("battery_resistance", "resistance_ohm", "ohm", 0.0, 4.0, None, 0.1),),
            ("motor",), "acceleration, stall; both motors couple", "battery as a source behind a resistance"),

@@ -12,7 +12,12 @@ from gecar.reality.residuals.of_recording import RecordingResiduals
 
 
 def notes_on(
-    split: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool, candidates: Sequence[str] = ()
+    split: Split,
+    fitted: Residuals,
+    clocks_fitted: bool,
+    doubted: bool,
+    candidates: Sequence[str] = (),
+    alike: Sequence[Sequence[str]] = (),
 ) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
@@ -28,11 +33,18 @@ def notes_on(
         Whether a misfit of readings points to the measured path, rather than to the sensor.
     candidates
         Effects accepted on the recordings fitted on, and not confirmed by those set aside.
+    alike
+        Sets of effects of which one can be larger and another smaller at hardly any cost.
     """
     notes = [
         f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
         "contains its neutral value: a candidate, not a finding."
         for effect in candidates
+    ]
+    notes += [
+        f"These recordings hardly tell {', '.join(together[:-1])} and {together[-1]} apart: more of one with less of "
+        "another fits about as well. The intervals say how far."
+        for together in alike
     ]
     if split.by_time:
         notes.append(

@@ -18,7 +18,7 @@ from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.parting import Sizes
-from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL
+from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL, UNNAMED
 from gecar.world.effects import BY_ID, Parameter
 from gecar.world.robot import Robot
 
@@ -83,14 +83,28 @@ class Problem:
 
         A motor on a bench is known to tenths of a percent, and what its model is off by is what one looks for.
         """
-        if not self.blocks or self.on_bench:
+        return self if self.on_bench else self._beside(model, free_effects, SMALL, lambda parameter: 1.0)  # noqa: ARG005
+
+    def beside_unnamed(self, model: Model) -> Problem:
+        """Return the problem beside changes of all other parameters of a size that a bench leaves open (`unnamed`)."""
+        return self._beside(model, None, UNNAMED, unnamed)
+
+    def _beside(
+        self,
+        model: Model,
+        free_effects: Sequence[str] | None,
+        small: float,
+        sized: Callable[[Parameter], float],
+    ) -> Problem:
+        """Return the problem beside changes of a standard deviation, by parameter so many times as large."""
+        if not self.blocks:
             return self
         kept = model.effects if free_effects is None else free_effects
         slopes = np.concatenate(
-            [np.where(e in kept, 0.0, g) for e, g in small_sensitivities(self, model).items()], axis=1
+            [np.where(e in kept, 0.0, g) for e, g in small_sensitivities(self, model, sized).items()], axis=1
         )
         errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
-        left = discrepancy(slopes, errors, self.estimator.blocks, channel, SMALL, LARGE)
+        left = discrepancy(slopes, errors, self.estimator.blocks, channel, small, LARGE)
         estimator = self.estimator.under(left)
         return replace(self, estimator=estimator, known=estimator.known())
 
@@ -177,8 +191,19 @@ def problem_of(
     return Problem(estimator, tuple(catalogue), material, sizes, estimator.known(), tell)
 
 
-def small_sensitivities(problem: Problem, model: Model) -> dict[str, Array]:
+def unnamed(parameter: Parameter) -> float:
+    """Return how many times `UNNAMED` a parameter may differ from its known value: as motors do, or below a name."""
+    return max(parameter.differs / (UNNAMED * parameter.worthwhile), 1.0)
+
+
+def small_sensitivities(
+    problem: Problem,
+    model: Model,
+    sized: Callable[[Parameter], float] = lambda p: 1.0,  # noqa: ARG005
+) -> dict[str, Array]:
     """Return the derivatives of residuals by small changes, in sizes worth a name, by effect, shape (n, changes).
+
+    Some may be so many times as large (``sized``).
 
     The ripple of a motor that is known for none has no phase yet: it may be any sum of sines. It comes after all other
     effects; then, under no name, what a gyro's own scale and bias do.
@@ -188,7 +213,8 @@ def small_sensitivities(problem: Problem, model: Model) -> dict[str, Array]:
     out = {}
     for effect, slopes in zip(problem.catalogue, found, strict=True):
         small = _small(effect)
-        out[effect] = slopes[:, [p in small for p in BY_ID[effect].parameters]]
+        factors = np.array([sized(p) for p in small])
+        out[effect] = slopes[:, [p in small for p in BY_ID[effect].parameters]] * factors
     if RIPPLE in out:
         del out[RIPPLE]
         if RIPPLE not in model.effects:
