@@ -218,6 +218,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             valleys(motion.explained.problem, motion.explained.taken)
             if motion.explained.problem.on_bench
             else (),
+            motion.encoders_left_out,
         ),
         evidence=Evidence(
             motion.explained,
@@ -241,11 +242,14 @@ class _Stage(Confirmation):
         95 % intervals of the effects' parameters, by effect and label.
     laws, invented
         The laws, and what the verdict says of them.
+    encoders_left_out
+        Whether the encoders were left out, as nothing explains them.
     """
 
     spans: Mapping[str, Mapping[str, Interval]]
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
+    encoders_left_out: bool = False
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
@@ -253,10 +257,31 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     catalogue = observable(context.catalogue, fitted)
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
     motion = _with_intervals(context, confirmed(explain(problem), held))
-    explained = motion.explained
-    if explained.steps:
+    if motion.explained.unexplained:
+        motion = _without_encoders(context, fitted, held) or motion
+    if motion.explained.steps:
         return motion
-    return replace(motion, explained=with_spot(explained))
+    return replace(motion, explained=with_spot(motion.explained))
+
+
+def _without_encoders(context: _Context, fitted: Residuals, held: Residuals) -> _Stage | None:
+    """Explain the poses alone, where encoders have something that nothing explains; None where that explains nothing.
+
+    An encoder that errs in a way of its own would otherwise hide what the poses show, as it counts in every sample.
+    """
+    blind = tuple(residuals.without_encoders() for residuals in (fitted, held))
+    if not blind[0].recordings or not any(r.replayer.has_poses for r in fitted.recordings):
+        return None
+    context.tell("much is unexplained: once more without the encoders")
+    catalogue = observable(context.catalogue, blind[0])
+    problem = problem_of(blind[0], context.robot, catalogue, context.material, context.seed, context.tell)
+    motion = _with_intervals(context, confirmed(explain(problem), blind[1]))
+    if not motion.explained.steps or motion.explained.unexplained:
+        return None
+    left = problem.sizes.of(fitted).left(motion.explained.taken.physics)
+    return replace(
+        motion, explained=replace(motion.explained, left=left, unexplained=True), encoders_left_out=True
+    )
 
 
 def _explain_sensor(

@@ -18,6 +18,7 @@ def notes_on(
     doubted: bool,
     candidates: Sequence[str] = (),
     alike: Sequence[Sequence[str]] = (),
+    encoders_left_out: bool = False,
 ) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
@@ -35,12 +36,19 @@ def notes_on(
         Effects accepted on the recordings fitted on, and not confirmed by those set aside.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
+    encoders_left_out
+        Whether the encoders were left out, as nothing explains them.
     """
     notes = [
         f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
         "contains its neutral value: a candidate, not a finding."
         for effect in candidates
     ]
+    if encoders_left_out:
+        notes.append(
+            "The encoders have an error of their own, which no effect of the catalogue explains. They were left out: "
+            "what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles."
+        )
     notes += [
         f"These recordings hardly tell {', '.join(together[:-1])} and {together[-1]} apart: more of one with less of "
         "another fits about as well. The intervals say how far."

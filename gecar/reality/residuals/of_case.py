@@ -109,6 +109,11 @@ class Residuals:
         """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
         return np.array([r.nuisances.clock_offset_s for r in self.recordings])
 
+    def without_encoders(self) -> Residuals:
+        """Return these of the recordings with poses, without what their encoders measured and without nuisances."""
+        seen = [run for run in self.recordings if run.replayer.has_poses]
+        return replace(self, recordings=tuple(run.without_encoders() for run in seen))
+
     def with_clock_offsets(self, offsets_s: Array) -> Residuals:
         """Return these with other camera clocks, shape (recordings,) [s]."""
         changed = [

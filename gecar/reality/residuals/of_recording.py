@@ -76,6 +76,12 @@ class RecordingResiduals:
             replayer = replayer.with_mark(nuisances.mark)
         return replace(self, replayer=replayer, nuisances=nuisances)
 
+    def without_encoders(self) -> RecordingResiduals:
+        """Return this without what the encoders measured, and without nuisances."""
+        unseen = np.full(len(self.recording.t_s), np.nan)
+        recording = replace(self.recording, left_angle_rad=unseen, right_angle_rad=unseen)
+        return residuals_of(recording, self.noise, self.replayer.inputs.memory, self.course)
+
     def localised(self, physics: Physics) -> RecordingResiduals:
         """Return this with the start pose its readings tell, where no camera looked; or else the bare floor it read."""
         encoders = self.recording.left_angle_rad, self.recording.right_angle_rad
