@@ -50,14 +50,10 @@ def is_worthwhile(model: Model, effect: str) -> bool:
 
 
 def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
-    """Return the best steps of a stage that gain enough.
-
-    On a bench, where nothing is noise and supply, friction and inertia do nearly the same, only those of sizes worth a
-    name that no bound stopped compete.
-    """
+    """Return the best steps of a stage that gain enough; on a bench, where nothing is noise, of sizes worth a name."""
     stage = [step for step in stage if not imitates_dry_friction(problem, step.model)]
     if problem.on_bench:
-        stage = [step for step in stage if step.worthwhile and not stopped(step)]
+        stage = [step for step in stage if step.worthwhile]
     best = max((step.gain for step in stage), default=0.0)
     return [
         step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best) and not stopped(step)
