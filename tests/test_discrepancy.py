@@ -23,6 +23,7 @@ from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
+from gecar.world.effects import CATALOGUE
 
 FOUR = ("viscous_friction", "rotor_inertia", "track_width", "wheel_radius")
 RESPONSES = {effect: bumps(seed, 4, 1.0) for seed, effect in enumerate(FOUR, start=1)}
@@ -148,3 +149,10 @@ def test_what_matters_may_be_chosen(nothing, tmp_path) -> None:
     assert verdict.as_json()["minor"][0]["moves"]["mm"] > 1.0
     with pytest.raises(InputError, match="--material: found 0"):
         command([tmp_path], material=0.0)
+
+
+def test_what_is_bent_at_neutral_is_no_small_change(nothing) -> None:
+    bent = {p.label for effect in CATALOGUE for p in effect.parameters if not p.smooth}
+    assert bent == {"right_minus_left_pct", "forward_minus_backward_pct"}
+    assert nothing.residual.white
+    assert nothing.residual.size.mm_1m < 1.0

@@ -51,6 +51,8 @@ class Parameter:
         sizes worth a name. Measured against a 3D engine; gears that give add to their play 0.3 to 0.8 degrees there.
     differs
         Standard deviation over motors of one kind and batteries, in that unit; 0: no more than a name is worth.
+    smooth
+        Whether small changes from neutral act in proportion, to both sides; others are no part of the discrepancy.
     """
 
     field: str
@@ -68,6 +70,7 @@ class Parameter:
     model_error: float = 0.02
     model_error_steps: float = 0.15
     differs: float = 0.0
+    smooth: bool = True
 
 
 @dataclass(frozen=True)
@@ -206,8 +209,8 @@ CATALOGUE: tuple[Effect, ...] = (
            # friction holds 4 % of an EV3's duty anyway: a threshold without an offset must exceed it
            worth=({"duty_pct": 1.0, "offset_share": 0.3}, {"duty_pct": 5.0})),
     Effect("dead_band_asymmetry", "the small duty that gives no torque differs by motor or direction",
-           (_P("dead_band_right", "right_minus_left_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01),
-            _P("dead_band_forward", "forward_minus_backward_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01)),
+           (_P("dead_band_right", "right_minus_left_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01, smooth=False),
+            _P("dead_band_forward", "forward_minus_backward_pct", "%", -40.0, 40.0, 0.0, 2.0, 0.01, smooth=False)),
            ("motor",), "small duty, by motor or sign", "a micromouse: 26-29 % of duty and 16-20 %",
            needs=("both directions",)),
     Effect("duty_curve", "the motor driver's voltage is not proportional to duty",

@@ -225,7 +225,9 @@ def small_sensitivities(
 
 def _small(effect: str) -> list[Parameter]:
     """Return the parameters that may be off a little: derivatives at neutral say what that does."""
-    return [] if effect == RIPPLE else [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0]
+    return (
+        [] if effect == RIPPLE else [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0 and p.smooth]
+    )
 
 
 def scattered(offsets_s: Array) -> bool:
