@@ -17,6 +17,7 @@ from gecar.files import is_file, read_toml
 from gecar.language.mapping import MappingOptions
 from gecar.parallel.executors import MAX_WORKERS, usable_cores
 from gecar.search.settings import Settings, preset
+from gecar.world.course.course import course_parts
 from gecar.world.rollout import STEP_S
 
 Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -75,7 +76,7 @@ class Config(BaseModel):
     @property
     def course_name(self) -> str:
         """The courses' names in short, fit for the name of a folder."""
-        stems = (Path(part).stem for part in self.course.split("+"))
+        stems = (Path(part).stem for part in course_parts(self.course))
         return re.sub(r"[^\w.+-]", "-", "+".join(stems))[:60]
 
     @property
@@ -109,7 +110,7 @@ def configure(table: Mapping[str, Any], where: str | Path = "configuration") -> 
         if field in given:
             given[field] = _place(str(given[field]))
     if "course" in given:
-        given["course"] = _places(str(given["course"]))
+        given["course"] = "+".join(map(_place, course_parts(str(given["course"]))))
     try:
         return Config.model_validate(given)
     except ValidationError as error:
@@ -159,13 +160,6 @@ def _pairs(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[tuple[str
     return flat + [
         (f"search.{name}", value, theirs["search"][name]) for name, value in ours["search"].items()
     ]
-
-
-def _places(names: str) -> str:
-    """Do the same for each of several courses, where they are several."""
-    return (
-        _place(names) if is_file(Path(names)) else "+".join(_place(name.strip()) for name in names.split("+"))
-    )
 
 
 def _place(name: str) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import binomtest
 
 from gecar.errors import expected
 from gecar.files import read_text
@@ -115,6 +114,8 @@ def summed_up(drives: Sequence[CourseDrive]) -> dict[str, Any]:
         ``high``, its 95 % interval (Clopper and Pearson, Biometrika 26(4), 1934). ``arrive``: share of the drives under
         random conditions that reach GOAL. ``times_bound``: median time on driven courses over the lower bound, or None.
     """
+    from scipy.stats import binomtest  # noqa: PLC0415  a third of a command's start, and seldom wanted
+
     times = [drive.time_s / drive.lower_bound_s for drive in drives if drive.driven]
     interval = binomtest(len(times), len(drives)).proportion_ci(0.95)
     return {

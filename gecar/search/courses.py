@@ -48,8 +48,7 @@ def spread(
     course = np.concatenate([np.zeros(0, np.intp), *(rng.permutation(len(worlds)) for _ in range(rounds))])
     course = course[:count]
     starts = np.array([world.start for world in worlds])
-    moved = under._asdict() | {"start": under.start + (starts[course] - starts[0])}
-    return Conditions(**moved), course
+    return under.changed(start=under.start + (starts[course] - starts[0])), course
 
 
 def paces(worlds: Sequence[World]) -> npt.NDArray[np.float64]:

@@ -167,9 +167,7 @@ class Robot(_Section):
         if parameter.field == "com_ahead":  # between the axle and the caster, or the robot falls over
             short_of_caster = self.body.caster_ahead - math.copysign(0.001, self.body.caster_ahead)
             return min(round(short_of_caster, 6), 0.0), max(round(short_of_caster, 6), 0.0)
-        if parameter.unit.startswith(
-            "N m"
-        ):  # Bounds on torques are an EV3's; a larger drive has larger ones.
+        if parameter.unit.startswith("N m"):  # bounds are an EV3's; a larger drive has larger ones
             return -math.inf if parameter.low < 0.0 else parameter.low, math.inf
         return parameter.low, parameter.high
 

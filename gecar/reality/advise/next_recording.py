@@ -91,33 +91,29 @@ def suggest(
     about
         An effect to ask about; default: none in particular.
     """
-    unseen = [about] if about else [effect for effect, limit in (limits or {}).items() if limit is None]
-    if about or (unseen and not (rivals or laws or unexplained or found)):
-        return _about_unseen(robot, unseen, like, noise)
-    if rivals:
-        return _about_confused(robot, next(f for f in found if f.alternatives), rivals[0], like, noise)
-    if laws:
-        return _about_laws(robot, laws, like, noise)
-    if found:
-        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
-        why = f"narrows the interval of {found[0].id} further"
-    else:
-        name, why = "reversals", "nothing is missing so far; this stresses gears, friction and grip most"
-    if unexplained:
+    unseen = [effect for effect, limit in (limits or {}).items() if limit is None]
+    name, why = "reversals", "nothing is missing so far; this stresses gears, friction and grip most"
+    if about:
+        name, why = _showing(robot, [about], like, noise)
+    elif rivals:
+        confused = next(f for f in found if f.alternatives)
+        name, told = _distinguishing(robot, rivals[0], like, noise)
+        why = f"{told} {confused.id} from {_listed(confused.alternatives)}"
+    elif laws:
+        name, why = _about_laws(robot, laws, like, noise)
+    elif unexplained:
         name = "long and slow, then long and fast"
         why = "shows whether the residual depends on speed, distance or time"
+    elif found:
+        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
+        why = f"narrows the interval of {found[0].id} further"
+    elif unseen:
+        name, why = _showing(robot, unseen, like, noise)
     return NextRecording(f"{name}: {why}", LIBRARY[name])
 
 
-def _about_confused(robot: Robot, found: Found, rival: Robot, like: Recording, noise: Noise) -> NextRecording:
-    """Return what distinguishes an effect from its alternatives."""
-    name, apart = _telling(robot, rival, like, noise)
-    told = "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
-    return NextRecording(f"{name}: {told} {found.id} from {_listed(found.alternatives)}", LIBRARY[name])
-
-
-def _about_unseen(robot: Robot, effects: Sequence[str], like: Recording, noise: Noise) -> NextRecording:
-    """Return the sequence that shows most of some effects, each of a size worth a name."""
+def _showing(robot: Robot, effects: Sequence[str], like: Recording, noise: Noise) -> tuple[str, str]:
+    """Return the sequence that shows most of some effects, each of a size worth a name, and which it shows."""
     rivals = {effect: _with_effect(robot, effect) for effect in effects}
     shown = {
         name: [e for e in effects if difference(commands, robot, rivals[e], like, noise) >= LEAST_DIFFERENCE]
@@ -125,9 +121,14 @@ def _about_unseen(robot: Robot, effects: Sequence[str], like: Recording, noise: 
     }
     best = max(shown, key=lambda name: len(shown[name]))
     if shown[best]:
-        return NextRecording(f"{best}: would show {_listed(shown[best])}", LIBRARY[best])
-    words = f"{best}: no sequence of the library shows {_listed(effects)} with these sensors"
-    return NextRecording(words, LIBRARY[best])
+        return best, f"would show {_listed(shown[best])}"
+    return best, f"no sequence of the library shows {_listed(effects)} with these sensors"
+
+
+def _distinguishing(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, str]:
+    """Return the sequence in which two robots part furthest, and whether that is far enough, as a verb."""
+    name, apart = _telling(robot, rival, like, noise)
+    return name, "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
 
 
 def _listed(effects: Sequence[str]) -> str:
@@ -150,18 +151,15 @@ def _at_interval_end(robot: Robot, found: Found) -> Robot:
     return robot.with_effects({found.id: {**values, label: interval.high}})
 
 
-def _about_laws(robot: Robot, laws: Sequence[Invented], like: Recording, noise: Noise) -> NextRecording:
+def _about_laws(robot: Robot, laws: Sequence[Invented], like: Recording, noise: Noise) -> tuple[str, str]:
     """Return what tells a law from one that does as well at another port, or else knows its constants better."""
     doubtful = next((law for law in laws if law.alternatives), None)
     if doubtful is None:
         name, _ = _telling(robot, _with_law(robot, laws[0].term, _at_end(laws[0])), like, noise)
-        why = f"narrows the constants of the law at {laws[0].term.port} further"
-    else:
-        law, other = doubtful.term, doubtful.alternatives[0]
-        name, apart = _telling(robot, _with_law(robot, law, other), like, noise)
-        told = "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
-        why = f"{told} a law at {law.port} from one at {other.port}"
-    return NextRecording(f"{name}: {why}", LIBRARY[name])
+        return name, f"narrows the constants of the law at {laws[0].term.port} further"
+    law, other = doubtful.term, doubtful.alternatives[0]
+    name, told = _distinguishing(robot, _with_law(robot, law, other), like, noise)
+    return name, f"{told} a law at {law.port} from one at {other.port}"
 
 
 def _with_law(robot: Robot, law: Term, other: Term) -> Robot:

@@ -169,7 +169,7 @@ def _compare_yaw_rates(
 
 @kernel
 def _remember_yaw(flat: Array, lanes: int) -> None:
-    """Keep every lane's yaw rate for the step after the next."""
+    """Keep every lane's yaw rate before a step."""
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         r = _load_row(flat, lanes, lane)

@@ -34,6 +34,7 @@ __all__ = [
     "Obstacle",
     "Pose",
     "course_names",
+    "course_parts",
     "list_courses",
     "load_course",
     "load_courses",
@@ -237,6 +238,11 @@ def load_course(name_or_path: str | Path) -> Course:
     return parse_course(read_text(path, "a course file"), str(path))
 
 
+def course_parts(text: str) -> list[str]:
+    """Cut a text that names courses at each ``+``; a file's name may hold some."""
+    return [text] if is_file(Path(text)) else [part.strip() for part in text.split("+")]
+
+
 def course_names(text: str) -> list[str]:
     """Return the names in a text that names courses: ``paper+mine.toml``, ``random:1-20`` for twenty random courses.
 
@@ -246,14 +252,14 @@ def course_names(text: str) -> list[str]:
         If one is named twice, there are too many, or a range runs backwards.
     """
     names: list[str] = []
-    for part in [text] if is_file(Path(text)) else text.split("+"):
-        seeds = _RANDOM.fullmatch(part.strip())
+    for part in course_parts(text):
+        seeds = _RANDOM.fullmatch(part)
         first, last = (int(seeds[1]), int(seeds[2] or seeds[1])) if seeds else (0, 0)
         if last < first:
             raise expected("--course", f"'{part}'", f"seeds in order, random:{last}-{first}")
         if last - first + len(names) >= _MOST_COURSES:
             raise expected("--course", f"'{text[:60]}'", f"at most {_MOST_COURSES} courses")
-        names += [f"random:{seed}" for seed in range(first, last + 1)] if seeds else [part.strip()]
+        names += [f"random:{seed}" for seed in range(first, last + 1)] if seeds else [part]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise expected("--course", f"'{twice[0]}' twice", "different courses")

@@ -48,6 +48,10 @@ class Conditions(NamedTuple):
         """How many drives."""
         return len(self.physics)
 
+    def changed(self, **columns: npt.NDArray[Any]) -> Conditions:
+        """Return these with other columns; `_replace` takes the number of drives for that of columns."""
+        return Conditions(**{**self._asdict(), **columns})
+
 
 def conditions(
     physics: npt.NDArray[Any],
@@ -101,8 +105,7 @@ def select(under: Conditions, rows: Sequence[int] | slice) -> Conditions:
 
 def impatient(under: Conditions) -> Conditions:
     """Return conditions under which a drive that reaches no further tile for a third of the time limit is given up."""
-    columns = dict(zip(Conditions._fields, under, strict=True))
-    return Conditions(**{**columns, "patience": under.limit // 3})
+    return under.changed(patience=under.limit // 3)
 
 
 def joined(several: Sequence[Conditions]) -> Conditions:
