@@ -36,7 +36,7 @@ class LinearResiduals:
         return tuple(SimpleNamespace(recording=RUN) for _ in range(self.count))
 
     def gyro_errors(self) -> np.ndarray:
-        return np.zeros((len(self.noise), 2))
+        return np.zeros((len(self.noise), 3))
 
     @property
     def clock_offsets_s(self) -> np.ndarray:

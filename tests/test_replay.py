@@ -11,6 +11,7 @@ from acting import strong
 
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
+from gecar.reality.replay.kernel import _between
 from gecar.reality.replay.replayer import replay, replayer_of
 from gecar.world.effects import CATALOGUE
 from gecar.world.kernel.lock_step import LANES
@@ -173,3 +174,10 @@ def test_a_yaw_rate_is_that_of_its_moment() -> None:
     np.testing.assert_allclose(
         turned, np.unwrap(recording.heading_rad)[1:] - recording.heading_rad[0], atol=2e-3
     )
+
+
+def test_a_yaw_rate_where_a_command_changes_is_that_of_the_kink() -> None:
+    """A rate that rises by 1 a step up to here, and falls by 1 from here on: half a step from both, it is highest."""
+    assert _between(-1.5, -0.5, -0.5, -1.5, 0.5) == 0.0
+    assert _between(0.0, 0.0, 1.0, 2.0, 0.5) == 0.5  # the kink lies before
+    assert _between(-2.0, -1.0, 0.0, 0.0, 0.25) == -0.75  # and here after

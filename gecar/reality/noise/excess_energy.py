@@ -41,10 +41,9 @@ class Blocks:
         self._of = _group(index, BLOCK_S)
         self.count = int(self._of.max()) + 1 if len(self._of) else 0
         self.samples = np.bincount(self._of, minlength=self.count)
-        self._channel = np.zeros(self.count, np.int64)
-        self._channel[self._of] = index.channel
-        self._channel_of_span = np.zeros(int(self.spans.max(initial=-1)) + 1, np.int64)
-        self._channel_of_span[self.spans] = index.channel
+        self._channel = _first(self._of, index.channel)
+        groups = (self.spans, self._of, _group(index, BLOCK_S / 3.0), np.arange(len(index.channel)))
+        self._scales = [(of, _first(of, index.channel)) for of in groups]
         self.recording = np.zeros(self.count, np.int64)
         self.recording[self._of] = index.recording
         self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
@@ -84,12 +83,16 @@ class Blocks:
         return np.bincount(self._of, values, self.count).astype(float)
 
     def variances(self, errors: Array) -> Array:
-        """Return the variance of each channel's means over half-second spans, shape (channels,); 1 for white noise."""
-        energy = np.bincount(self.spans, errors) ** 2 / np.bincount(self.spans)
-        total, count = (
-            np.bincount(self._channel_of_span, v, len(CHANNELS)) for v in (energy, np.ones(len(energy)))
-        )
-        out: Array = np.where(count > 0.0, total / np.maximum(count, 1.0), 1.0)
+        """Return the variance of each channel's means over spans, shape (channels,); 1 for white noise.
+
+        Spans last half a second, a block's time or a third of that, or a sample; that counts which shows most. What a
+        model is off by may last, as where a wheel is too large, or pass, as where it answers a command too quickly.
+        """
+        out = np.ones(len(CHANNELS))
+        for of, channel in self._scales:
+            energy = np.bincount(of, errors) ** 2 / np.bincount(of)
+            total, count = (np.bincount(channel, v, len(CHANNELS)) for v in (energy, np.ones(len(energy))))
+            out = np.maximum(out, total / np.maximum(count, 1.0))
         return out
 
     def inflation(self, errors: Array) -> Array:
@@ -132,6 +135,13 @@ class Blocks:
         )
         _, first, later = np.intersect1d(place + lag, place, return_indices=True)
         return first, later
+
+
+def _first(of: npt.NDArray[np.int64], values: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:
+    """Return the value that all members of each group have, shape (groups,)."""
+    out = np.zeros(int(of.max(initial=-1)) + 1, np.int64)
+    out[of] = values
+    return out
 
 
 def _folds(index: ResidualIndex) -> npt.NDArray[np.int32]:

@@ -69,10 +69,11 @@ TIMING = ("clock_skew", "actuation_delay", "pose_delay", "duty_cap")
 
 _ROW = (
     "left_error right_error battery_error yaw_error "
-    "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside yaw_before"
+    "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside "
+    "yaw_1_ago yaw_2_ago yaw_3_ago"
 )
 ROW = np.dtype([(field, np.float64) for field in _ROW.split()])
-"""Normalised residuals at a row; what is predicted there, in the order of the columns above; yaw rate a step ago."""
+"""Normalised residuals at a row; what is predicted there, in the order of the columns above; yaw rates steps ago."""
 
 _OF_ROW = N_FIELDS + len(FILTER.descr)
 _OF_POSE = _OF_ROW + len(ROW.descr)
@@ -149,17 +150,18 @@ def _compare_yaw_rates(
     lanes: int,
     off: float,
 ) -> int:
-    """Predict, compare and keep the yaw rates of rows from ``i`` up to half a step ago; return the row after them.
+    """Predict, compare and keep the yaw rates of rows up to one and a half steps ago; return the row after them.
 
-    Velocities are those of the middle of a step, and between two middles a line. Taken as they are, rows on the edge of
-    two steps would jump from one to the other as a clock is a little faster or slower. Terms add ``off`` to each.
+    They begin with row ``i``. Velocities are those of the middle of a step, and rows lie between two middles. Taken as
+    they are, rows on the edge of two steps would jump from one to the other as a clock is a little faster or slower.
+    Terms add ``off`` to each.
     """
-    while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now - 0.5 * dt + 1e-9:
-        share = 1.5 - (now - inputs.t[i] * stretch) / dt
+    while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now - 1.5 * dt + 1e-9:
+        share = 2.5 - (now - inputs.t[i] * stretch) / dt
         for lane in range(lanes):
             s = load_state(flat, lanes, lane)
             r = _load_row(flat, lanes, lane)
-            rate = r.yaw_before + share * (s.yaw_rate - r.yaw_before) + off
+            rate = _between(r.yaw_3_ago, r.yaw_2_ago, r.yaw_1_ago, s.yaw_rate, share) + off
             kept.row_errors[i, 3 * lanes + lane] = (inputs.measured[i, 3] - rate) / inputs.sd[2]
             if kept.rows.shape[0] > 0:
                 kept.rows[i, YAW_RATE * lanes + lane] = rate
@@ -168,12 +170,25 @@ def _compare_yaw_rates(
 
 
 @kernel
+def _between(a: float, b: float, c: float, d: float, share: float) -> float:
+    """Return a value so far from ``b`` to ``c``, of four at equal distances.
+
+    Where a command changes, rates have a kink. It lies in one of the three intervals, and two of the three lines, the
+    middle one and those continued from either side, do not cross it: the median is one of them (limiters of Harten,
+    Engquist, Osher, Chakravarthy, J. Computational Physics 71 (1987) 231, choose among lines to the same end).
+    """
+    from_left, middle = b + share * (b - a), b + share * (c - b)
+    from_right = c - (1.0 - share) * (d - c)
+    return max(min(from_left, middle), min(max(from_left, middle), from_right))
+
+
+@kernel
 def _remember_yaw(flat: Array, lanes: int) -> None:
-    """Keep every lane's yaw rate before a step."""
+    """Keep every lane's yaw rates before a step."""
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         r = _load_row(flat, lanes, lane)
-        r.yaw_before = s.yaw_rate
+        r.yaw_3_ago, r.yaw_2_ago, r.yaw_1_ago = r.yaw_2_ago, r.yaw_1_ago, s.yaw_rate
         _store_row(flat, lanes, lane, r)
 
 

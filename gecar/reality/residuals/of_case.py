@@ -17,6 +17,7 @@ import numpy.typing as npt
 from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.channels import ResidualIndex
+from gecar.reality.replay.odometry import smoothed_rows
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.residuals.threads import Threads
 from gecar.world.course.course import Course, load_course
@@ -25,7 +26,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 Physics = npt.NDArray[Any]
 
-GYRO_SCALE, GYRO_BIAS_RAD_S = 0.02, 0.01  # a LEGO gyro: within 2 % and 0.6 deg/s
+GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: within 2 %, 0.6 deg/s, 10 ms
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
@@ -76,20 +77,20 @@ class Residuals:
         return whole.kept(there), there
 
     def gyro_errors(self) -> Array:
-        """Return what a gyro with a scale and a bias of its own adds to residuals of motion, shape (n, 2).
+        """Return what a gyro with a scale, a bias and a delay of its own adds to residuals of motion, shape (n, 3).
 
-        Of a size that is not worth a name: `GYRO_SCALE` and `GYRO_BIAS_RAD_S`.
+        Of a size that is not worth a name: `GYRO_SCALE`, `GYRO_BIAS_RAD_S` and `GYRO_LATE_S`.
         """
         if self.sensor or not self.recordings:
-            return np.zeros((len(self.index.t_s), 2))
+            return np.zeros((len(self.index.t_s), 3))
         parts = []
         for run in self.recordings:
             rows, poses = len(run.replayer.t), len(run.replayer.inputs.pose_t)
-            part = np.zeros((4 * rows + 3 * poses, 2))
-            rate, sd = run.replayer.measured[:, 3], float(run.noise.sd[2])
-            part[3 * rows : 4 * rows] = (
-                np.column_stack([GYRO_SCALE * rate, np.full(rows, GYRO_BIAS_RAD_S)]) / sd
-            )
+            part = np.zeros((4 * rows + 3 * poses, 3))
+            rate, t = run.replayer.measured[:, 3], run.replayer.t
+            late = -GYRO_LATE_S * np.gradient(smoothed_rows(rate, t), t)
+            added = np.column_stack([GYRO_SCALE * rate, np.full(rows, GYRO_BIAS_RAD_S), late])
+            part[3 * rows : 4 * rows] = added / float(run.noise.sd[2])
             parts.append(part)
         return np.concatenate(parts)[self._located[1]]
 
