@@ -30,7 +30,10 @@ _SIZES = (3.0, 12.0)  # in steps worth a name
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
-PATCH_RADII_M = (0.1, 0.15, 0.2, 0.3)
+PATCH_RADII_M = (0.07, 0.1, 0.15, 0.2, 0.3)
+SCANNED_RADIUS_M = 0.1
+PATCH_GRIPS = (0.06, 0.15, 0.3, 0.45, 0.65)
+SCANNED_GRIPS = (0.15, 0.3, 0.6)
 
 
 def initial_values(
@@ -71,7 +74,9 @@ def responses(
         return
     values: Sequence[Values] = ()
     if effect.scan == "floor cells":
-        values = [_patch(*cell, radius) for cell in _cells(recordings) for radius in PATCH_RADII_M]
+        larger = [r for r in PATCH_RADII_M if r > SCANNED_RADIUS_M]
+        values = [_patch(*cell, radius, SCANNED_GRIPS[0]) for cell in _cells(recordings) for radius in larger]
+        values += _scanned(recordings)
     elif effect.starts or effect.scan:
         values = initial_values(effect_id, robot, recordings, errors)
     if values:
@@ -198,34 +203,53 @@ def _wheel_angles(recording: Recording) -> Array:
 
 
 def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
-    """Scan the floor where the robot has been, on a grid a patch cannot slip through; then sizes and grips there."""
-    tried = [_patch(x, y, PATCH_RADII_M[0]) for x, y in _cells(recordings)]
-    best = [tried[k] for k in np.argsort(cost_of_each(errors, tried), kind="stable")[:BEST_CELLS]]
+    """Scan the floor where the robot has been, on a grid a patch cannot slip through; then sizes and grips there.
+
+    A patch that grips too little costs more than none: a cell counts by the multiple of what a patch does there that
+    lowers residuals most (a matched filter: Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4).
+    """
+    tried = _scanned(recordings)
+    bare = errors([{}])[0]
+    gains = np.array([_gain_of_multiple(bare, each - bare) for each in residuals_of_each(errors, tried)])
+    best = list(dict.fromkeys((tried[k]["x_m"], tried[k]["y_m"]) for k in np.argsort(-gains, kind="stable")))
     half = 0.5 * PATCH_PITCH_M
-    for values, radius, grip in itertools.product(best, PATCH_RADII_M, (0.06, 0.15, 0.3)):
+    for (x, y), radius, grip in itertools.product(best[:BEST_CELLS], PATCH_RADII_M, PATCH_GRIPS):
         for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
-            yield {
-                "radius_m": radius,
-                "coefficient": grip,
-                "x_m": values["x_m"] + dx,
-                "y_m": values["y_m"] + dy,
-            }
+            yield _patch(x + dx, y + dy, radius, grip)
 
 
-def _cells(recordings: Sequence[Recording]) -> list[tuple[float, float]]:
-    """Return places on a grid where the robot has been [m]; none where no camera looked."""
+def _gain_of_multiple(errors: Array, response: Array) -> float:
+    """Return by how much the best multiple of a response, 0 or more, lowers the residuals' cost."""
+    weighted = weights(errors) * response
+    asked, power = -float(weighted @ errors), float(weighted @ response)
+    return 0.5 * max(asked, 0.0) ** 2 / power if power > 0.0 else 0.0
+
+
+def _cells(recordings: Sequence[Recording], reach: int = 0) -> list[tuple[float, float]]:
+    """Return places on a grid where the robot has been, and so many cells around [m]; none where no camera looked."""
     places = np.concatenate([np.column_stack([r.x_m, r.y_m])[~np.isnan(r.x_m)] for r in recordings])
-    if not len(places):
-        return []
-    cells = np.unique(np.round(places / PATCH_PITCH_M).astype(int), axis=0) * PATCH_PITCH_M
-    return [
-        (float(x), float(y))
-        for x, y in cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))]
-    ]
+    around = range(-reach, reach + 1)
+    been = np.round(places / PATCH_PITCH_M).astype(int)
+    cells = np.unique(np.concatenate([been + each for each in itertools.product(around, around)]), axis=0)
+    kept = cells[np.unique(np.linspace(0, len(cells) - 1, MOST_CELLS).astype(int))] if len(cells) else cells
+    return [(float(x), float(y)) for x, y in kept * PATCH_PITCH_M]
 
 
-def _patch(x_m: float, y_m: float, radius_m: float) -> dict[str, float]:
-    return {"radius_m": radius_m, "x_m": x_m, "y_m": y_m, "coefficient": 0.15}
+def patches(recordings: Sequence[Recording], most: int) -> list[Values]:
+    """Return so many patches at most, spread over where the robot has been."""
+    cells = _cells(recordings)
+    every = math.ceil(len(cells) / most)
+    return [_patch(x, y, SCANNED_RADIUS_M, SCANNED_GRIPS[1]) for x, y in cells[:: max(every, 1)]]
+
+
+def _scanned(recordings: Sequence[Recording]) -> list[Values]:
+    """Return the patches scanned for; their centres may lie beside the robot's path."""
+    cells = _cells(recordings, reach=1)
+    return [_patch(*cell, SCANNED_RADIUS_M, grip) for cell in cells for grip in SCANNED_GRIPS]
+
+
+def _patch(x_m: float, y_m: float, radius_m: float, grip: float) -> dict[str, float]:
+    return {"radius_m": radius_m, "x_m": x_m, "y_m": y_m, "coefficient": grip}
 
 
 def _top_speeds(robot: Robot) -> Iterator[Values]:
