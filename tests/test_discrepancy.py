@@ -13,6 +13,7 @@ from gecar.cli.commands.discover import discover as command
 from gecar.errors import InputError
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.discrepancy import discrepancy
+from gecar.reality.fitting.initial_values import patches
 from gecar.reality.materiality import Material, Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.noise.sensor_noise import estimate_noise
@@ -64,6 +65,13 @@ def test_physics_in_no_list_makes_a_channel_as_noisy_as_it_leaves_it() -> None:
         1.0 + 50 * np.mean(unlisted**2) * 0.7, rel=0.3
     )  # spans of 50 samples
     assert none.ratios[0] < 1.3
+
+
+def test_what_a_model_is_off_by_for_a_moment_counts_as_what_lasts_does() -> None:
+    """Once up and once down within a tenth of a second, every half second: their mean over the span is nothing."""
+    rows = np.tile(np.r_[[5.0] * 5, [-5.0] * 5, np.zeros(40)], len(INDEX.t_s) // 50)
+    assert BLOCKS.variances(rows)[0] == pytest.approx(5.0**2 * 5 * 0.2, rel=0.05)
+    assert BLOCKS.variances(np.ones(len(rows)))[0] == pytest.approx(50.0)
 
 
 def test_many_small_changes_name_nothing() -> None:
@@ -129,6 +137,17 @@ def test_an_effect_of_the_size_of_its_limit_is_found(nothing, effect: str, label
     robot = EV3.with_effects({effect: {label: neutral + limit.size}})
     verdict = discover(Case("made", tuple(recorded(robot, seed) for seed in range(5))))
     assert [found.id for found in verdict.effects] == [effect]
+
+
+def test_patches_of_the_size_of_their_limit_are_found_at_most_places_that_were_passed(nothing) -> None:
+    size, found = nothing.limits["slippery_patch"].size, 0
+    fitted = [recorded(EV3, int(name.removeprefix("run_"))) for name in nothing.fitted_on]
+    for place in patches(fitted, 3):
+        robot = EV3.with_effects({"slippery_patch": {**place, "radius_m": size}})
+        for effect in discover(Case("made", tuple(recorded(robot, seed) for seed in range(5)))).effects:
+            assert effect.id == "slippery_patch"
+            found += abs(effect.parameters["x_m"].value - place["x_m"]) < 0.15
+    assert found >= 2
 
 
 def test_of_a_sensor_that_read_nothing_nothing_is_known(nothing) -> None:

@@ -14,11 +14,12 @@ from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_cos
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import stepwise
+from gecar.reality.selection.acceptance import candidates, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.screening import candidate_steps
-from gecar.reality.selection.share import share_asked_for
+from gecar.reality.selection.share import UNSEEN, share_asked_for
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import table
 
@@ -233,11 +234,8 @@ def set_aside(shares: list[float]) -> LinearResiduals:
 @pytest.mark.parametrize(
     ("shares", "gains", "kept"),
     [
-        (
-            [0.1, 0.4, 0.6, 0.6],
-            False,
-            True,
-        ),  # one recording tips the sum; half of it is asked for, surely not none
+        ([0.1, 0.6, 0.8, 0.8], True, True),  # less than was fitted is asked for, surely not none
+        ([0.1, 0.4, 0.6, 0.6], False, False),  # whole drives come out worse
         ([-1.5, 0.5, 1.5, 2.5], True, False),  # the sum is a toss of recordings that disagree
         ([0.2, 0.2, 0.2, 0.2], False, False),  # surely too little for the size that was fitted
     ],
@@ -275,3 +273,20 @@ def test_every_threshold_says_what_it_means_and_where_it_comes_from() -> None:
     rows = table()
     assert 10 < len(rows) < 35
     assert all(value.meaning and value.source for _, value in rows)
+
+
+def test_an_effect_after_which_whole_drives_come_out_worse_is_no_candidate() -> None:
+    """It gains beside small changes of other constants, which make up for it; no robot file has them."""
+    problem = linear_problem(linear({VISCOUS: 3.0}, RESPONSES))
+    (right, *_) = explain(problem).steps
+    wrong = replace(right, model=problem.estimator.at(right.model, np.array([9.0])))
+    assert candidates(problem, [right]) == [right]
+    assert worsens(problem, wrong)
+    assert candidates(problem, [wrong]) == []
+
+
+def test_recordings_that_do_not_show_an_effect_ask_for_any_share() -> None:
+    still = linear({}, RESPONSES, count=3).index
+    errors = bumps(1, 3, 1.0)
+    assert share_asked_for(still, errors, errors + 1e-3) is UNSEEN
+    assert share_asked_for(still, errors, errors + 0.1) is not UNSEEN

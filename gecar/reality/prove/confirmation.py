@@ -11,8 +11,9 @@ from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.selection.acceptance import worsens
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.share import Share, share_asked_for
+from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import Explanation, concluded
 from gecar.reality.selection.thresholds import MAIN_SHARE
 
@@ -39,8 +40,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
-    it was fitted, predicts worse than none (`share_asked_for`). Where much is left that nothing explains, whole drives
-    must come out better with the effect, too.
+    it was fitted, predicts worse than none (`share_asked_for`). An effect that none of them shows stays. Whole drives
+    must not come out worse with the effect; where much is left that nothing explains, they must come out better.
 
     Parameters
     ----------
@@ -51,12 +52,15 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """
     candidates = list[Step]()
     while explained.steps and held.recordings:
-        with_all = _held_errors(explained, held, explained.taken)
+        with_all = _held_errors(explained, held, explained.taken, explained.taken)
         judged = [_judged(explained, held, step, with_all) for step in explained.steps]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        worst, share = min(judged, key=lambda pair: pair[1].margin)
-        if share.margin > 0.0:
-            useless = [s for s in explained.steps if explained.unexplained and not _helps(explained, held, s)]
+        shown = [(step, share) for step, share in judged if share is not UNSEEN]
+        failing = [pair for pair in shown if pair[1].margin <= 0.0]
+        if failing:
+            worst, _ = min(failing, key=lambda pair: pair[1].margin)
+        else:
+            useless = [step for step, _ in shown if not _helps(explained, held, step)]
             if not useless:
                 break
             worst = useless[0]
@@ -68,21 +72,26 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
 def _judged(explained: Explanation, held: Residuals, step: Step, with_all: Array) -> tuple[Step, Share]:
     """Return a step with what it gains on recordings set aside, and the share of it they ask for.
 
-    ``with_all`` are their residuals under all steps, shape (n,).
+    Without the effect, all other constants may differ a little as with it, or as they would without it: in the first
+    case what they make up for would speak for the effect, in the second what they make up would. The less counts.
+    ``with_all`` are the residuals under all steps, shape (n,).
     """
-    without = _held_errors(explained, held, _without(explained.problem, explained.taken, step))
-    share = share_asked_for(held.index, without, with_all)
-    return replace(step, holdout_gain=cost(without) - cost(with_all)), share
+    model = _without(explained.problem, explained.taken, step)
+    without = [_held_errors(explained, held, model, beside) for beside in (explained.taken, model)]
+    gain = cost(without[0]) - cost(with_all)
+    shares = [share_asked_for(held.index, errors, with_all) for errors in without]
+    unseen = shares[0] is UNSEEN
+    return replace(step, holdout_gain=gain), UNSEEN if unseen else min(shares, key=lambda share: share.margin)
 
 
 def _helps(explained: Explanation, held: Residuals, step: Step) -> bool:
-    """Whether an effect explains a good part of what whole drives set aside leave without it."""
+    """Whether whole drives set aside come out no worse with an effect; or much better, where much is unexplained."""
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    models = explained.taken, _without(problem, explained.taken, step)
-    now, before = (
-        problem.material.times(sizes.left(problem.with_small_changes(model, explained.taken)))
-        for model in models
-    )
+    without = _without(problem, explained.taken, step)
+    if not explained.unexplained:
+        return not worsens(problem, replace(step, base=without, model=explained.taken), sizes)
+    beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
+    now, before = (problem.material.times(sizes.left(physics)) for physics in beside)
     return now**2 < (1.0 - MAIN_SHARE) * before**2
 
 
@@ -98,9 +107,9 @@ def _without(problem: Problem, model: Model, step: Step) -> Model:
     return problem.under(model, rest).estimator.fit(rest, model.values)
 
 
-def _held_errors(explained: Explanation, held: Residuals, model: Model) -> Array:
-    """Return residuals of recordings set aside, with the small changes that recordings fitted to ask for."""
-    physics = explained.problem.with_small_changes(model, explained.taken)
+def _held_errors(explained: Explanation, held: Residuals, model: Model, beside: Model) -> Array:
+    """Return a model's residuals of recordings set aside, with small changes as a model asks for."""
+    physics = explained.problem.with_small_changes(model, beside)
     if explained.problem.clocks_fitted and not held.sensor:
         held = with_fitted_clocks(held, physics)[0]
     return held.errors(physics)

@@ -10,6 +10,7 @@ from gecar.reality.fitting.initial_values import top_speed
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import Size
+from gecar.reality.residuals.parting import Sizes
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import spread_of_size
 from gecar.reality.selection.thresholds import (
@@ -49,15 +50,36 @@ def is_worthwhile(model: Model, effect: str) -> bool:
     return worthwhile(model.parameters, model.z, effect)
 
 
+def worsens(problem: Problem, step: Step, sizes: Sizes | None = None) -> bool:
+    """Whether whole drives come out worse with a step's effect than without, where that is material.
+
+    They do where an effect needs small changes of other constants to make up for it, which no robot file has.
+
+    Parameters
+    ----------
+    problem
+        What is material.
+    step
+        Models without the effect and with it.
+    sizes
+        Under the commands of which recordings; default: those fitted on.
+    """
+    left = (sizes or problem.sizes).left
+    before, now = (problem.material.times(left(model.physics)) for model in (step.base, step.model))
+    return now > max(before, 1.0)
+
+
 def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
-    """Return the best steps of a stage that gain enough; on a bench, where nothing is noise, of sizes worth a name."""
+    """Return the best steps of a stage that gain enough, and after which whole drives come out no worse.
+
+    On a bench nothing is noise: there, those of a size worth a name.
+    """
     stage = [step for step in stage if not imitates_dry_friction(problem, step.model)]
     if problem.on_bench:
         stage = [step for step in stage if step.worthwhile]
     best = max((step.gain for step in stage), default=0.0)
-    return [
-        step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best) and not stopped(step)
-    ]
+    enough = [s for s in stage[:RUNNERS_UP] if s.gain >= max(PRICE, COMPETING * best) and not stopped(s)]
+    return enough if problem.on_bench else [step for step in enough if not worsens(problem, step)]
 
 
 def imitates_dry_friction(problem: Problem, model: Model) -> bool:

@@ -29,7 +29,7 @@ from gecar.reality.selection.thresholds import SIGNIFICANCE
 Array = npt.NDArray[np.float64]
 
 AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an effect as without
-LEAST_CHANGE = 1e-6  # squared standard deviations: recordings in which an effect does not show
+LEAST_CHANGE = 1.0  # squared standard deviations: recordings in which an effect does not show
 ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
 
 
@@ -47,11 +47,11 @@ class Share:
         return min(self.low, self.high - AS_GOOD_WITHOUT)
 
 
-NONE = Share(0.0, 0.0, 0.0)
+UNSEEN = Share(0.0, -np.inf, np.inf)  # recordings that do not show an effect ask for any share
 
 
 def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) -> Share:
-    """Return the share of an effect that recordings ask for; `NONE` where it changes nothing in them.
+    """Return the share of an effect that recordings ask for; `UNSEEN` where it changes nothing in them.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) ->
     """
     change = without - with_effect
     if float(change @ change) < LEAST_CHANGE:
-        return NONE
+        return UNSEEN
     value = 0.0
     for _ in range(ROUNDS):
         errors = without - value * change

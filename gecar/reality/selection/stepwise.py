@@ -204,11 +204,12 @@ def _swapped_and_dropped(
     """
     steps, model = dict(enumerate(chain.steps)), chain.model
     rivals = {step.effect: step for stage in tried for step in stage[:RIVALS]}
-    for number, step in enumerate(chain.steps):
+    several = chain.steps if len(chain.steps) > 1 else ()  # one alone was judged beside nothing else
+    for number, step in enumerate(several):
         rest = [s.effect for s in steps.values() if s is not step]
         here = problem.under(model, rest)
         found = _judged(here, model, rest, step)
-        swap = _swapped(here, found, rest, list(rivals.values())) if rest else None
+        swap = _swapped(here, found, rest, list(rivals.values()))
         if swap is not None:
             steps[number], model = replace(swap, stage=step.stage), swap.model
         elif found.gain < PRICE or not proved(found):
