@@ -32,6 +32,7 @@ CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 PATCH_RADII_M = (0.07, 0.1, 0.15, 0.2, 0.3)
 SCANNED_RADIUS_M = 0.1
+LEAST_GAIN = 2.0  # log-likelihood: of noise in a hundred cells; a name costs more
 PATCH_GRIPS = (0.06, 0.15, 0.3, 0.45, 0.65)
 SCANNED_GRIPS = (0.15, 0.3, 0.6)
 
@@ -76,7 +77,7 @@ def responses(
     if effect.scan == "floor cells":
         larger = [r for r in PATCH_RADII_M if r > SCANNED_RADIUS_M]
         values = [_patch(*cell, radius, SCANNED_GRIPS[0]) for cell in _cells(recordings) for radius in larger]
-        values += _scanned(recordings)
+        values += [_patch(*cell, SCANNED_RADIUS_M, SCANNED_GRIPS[1]) for cell in _cells(recordings, reach=1)]
     elif effect.starts or effect.scan:
         values = initial_values(effect_id, robot, recordings, errors)
     if values:
@@ -211,7 +212,8 @@ def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Va
     tried = _scanned(recordings)
     bare = errors([{}])[0]
     gains = np.array([_gain_of_multiple(bare, each - bare) for each in residuals_of_each(errors, tried)])
-    best = list(dict.fromkeys((tried[k]["x_m"], tried[k]["y_m"]) for k in np.argsort(-gains, kind="stable")))
+    kept = (k for k in np.argsort(-gains, kind="stable") if gains[k] > LEAST_GAIN)
+    best = list(dict.fromkeys((tried[k]["x_m"], tried[k]["y_m"]) for k in kept))
     half = 0.5 * PATCH_PITCH_M
     for (x, y), radius, grip in itertools.product(best[:BEST_CELLS], PATCH_RADII_M, PATCH_GRIPS):
         for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
