@@ -175,6 +175,8 @@ class Drive:
         When each tile of the course's sequence was reached [s], nan where it was not, shape (k,).
     steps
         Steps simulated.
+    energy_j
+        Electrical energy that the motors took from the battery [J].
     trace
         Time series at 100 Hz by name (`TRACE_COLUMNS`; angles in rad, duties -1..1), or None.
     obstacles
@@ -186,6 +188,7 @@ class Drive:
     checkpoints: int
     arrival_s: npt.NDArray[np.float64]
     steps: int
+    energy_j: float
     trace: Mapping[str, npt.NDArray[np.float64]] | None = None
     obstacles: npt.NDArray[np.float64] | None = None
 
@@ -223,6 +226,7 @@ class Driver:
             np.zeros(2 * RING),
             np.zeros(1, STORES),
             NO_ENGINE,
+            np.zeros(1),
         )
 
     def simulate(self, opcodes: npt.NDArray[np.int32], seed: int = 0, trace: bool = False) -> Drive:
@@ -257,6 +261,7 @@ class Driver:
             checkpoints,
             arrival,
             n,
+            float(setup.energy[0]),
             dict(zip(TRACE_COLUMNS, kept.T.copy(), strict=True)) if trace else None,
             np.array(poses)[: len(kept)] if trace and self.obstacles else None,
         )

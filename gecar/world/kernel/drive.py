@@ -12,6 +12,7 @@ from gecar.world.kernel.chipmunk import SPACE, EngineArrays, engine_step
 from gecar.world.kernel.dynamics import drift, has_terms, step, step_with_terms, turn
 from gecar.world.kernel.eyes import Floor, look, see
 from gecar.world.kernel.interpreter import first_step_after, run_program
+from gecar.world.kernel.motor import battery_current
 from gecar.world.kernel.sensing import RING, delayed
 from gecar.world.kernel.state import place
 
@@ -40,6 +41,8 @@ class Setup(NamedTuple):
         Of the robot's terms, dtype `STORES`, shape (1,).
     engine
         pymunk's, or `NO_ENGINE`.
+    energy
+        What the motors have taken from the battery, the sum of V I dt [J], shape (1,).
     """
 
     physics: npt.NDArray[Any]
@@ -55,6 +58,7 @@ class Setup(NamedTuple):
     commands: npt.NDArray[np.float64]
     stores: npt.NDArray[Any]
     engine: EngineArrays
+    energy: npt.NDArray[np.float64]
 
 
 @kernel
@@ -190,6 +194,7 @@ def _drive_kernel(terms: bool) -> Any:  # noqa: C901
         if first == 0:
             place(s, p, setup.start[0], setup.start[1], setup.start[2])
             begin_program(k, setup.phase_ms, c.dt, s, p, floor)
+            setup.energy[0] = 0.0
         remembers = p.sensor_lag > 0.0 or p.sensor_delay > 0.0
         reached = int(np.rint(arrival[passed - 1] / c.dt)) if passed > 0 else 0
         for n in range(first, last):
@@ -213,6 +218,7 @@ def _drive_kernel(terms: bool) -> Any:  # noqa: C901
                 advance_with_terms(n, s, k.left_duty, k.right_duty, p, c, setup)
             else:
                 advance(n, s, k.left_duty, k.right_duty, p, c, setup.commands, setup.engine)
+            setup.energy[0] += s.voltage * battery_current(s, p) * c.dt
         return RUNNING, last, passed
 
     on = kernel(drive_on)

@@ -19,10 +19,10 @@ from gecar.compiled import blank, kernel
 from gecar.world.kernel.contacts import release_contacts, sweep
 from gecar.world.kernel.motor import (
     awake,
+    battery_current,
     conduct,
     effective_duty,
     friction_budget,
-    motor_current,
     regulate,
     slewed,
     supply,
@@ -202,10 +202,7 @@ def end_step(s: Any, p: Any, c: Any, effects: bool) -> None:
 def _load_battery(s: Any, p: Any) -> None:
     """Set the current both motors draw, which lowers the voltage of the next step."""
     if p.battery_resistance > 0.0:
-        left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
-        right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
-        # A motor that brakes does not charge the battery: the practice case with a sagging battery says so.
-        s.battery_current = max(left, 0.0) + max(right, 0.0)
+        s.battery_current = battery_current(s, p)
 
 
 @kernel

@@ -119,6 +119,19 @@ def motor_current(duty: float, voltage: float, speed: float, p: Any) -> float:
 
 
 @kernel
+def battery_current(s: Any, p: Any) -> float:
+    """Return the current that both motors draw from the battery [A].
+
+    A bridge that switches at a duty draws that share of the motor's current: what goes in comes out (Mohan, Undeland,
+    Robbins, "Power Electronics", 3rd ed., 2003, eq. 7-5).
+    """
+    left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
+    right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
+    # A motor that brakes does not charge the battery: the practice case with a sagging battery says so.
+    return max(left, 0.0) + max(right, 0.0)
+
+
+@kernel
 def slewed(duty: float, last: float, c: Any) -> float:
     """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
     return min(max(duty, last - c.slew), last + c.slew)
@@ -188,7 +201,5 @@ def turn_bare_shafts(
     )
     s.left_angle += s.left_speed * c.dt
     s.right_angle += s.right_speed * c.dt
-    left = s.left_drive * motor_current(s.left_drive, s.voltage, s.left_speed, p)
-    right = s.right_drive * motor_current(s.right_drive, s.voltage, s.right_speed, p)
-    s.battery_current = max(left, 0.0) + max(right, 0.0)
+    s.battery_current = battery_current(s, p)
     s.t += c.dt
