@@ -92,6 +92,7 @@ class Evolution(Generic[P]):
         operators = operators or Operators.of(settings)
         operators.check(mapper, problem.n_cases)
         self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
+        self.operators = operators
         self.history: list[Generation] = []
         self.genomes: Genomes = np.zeros((0, 0), mapper.options.codon_type)
         self.scores: Scores = problem.failed(0)
@@ -275,10 +276,16 @@ class Evolution(Generic[P]):
         if self._offspring is None:
             raise expected("tell", "no generation that waits for scores", "ask first")
         told = self._pooled(self.problem.check(results, len(self._asked)))
-        offspring, scores = self._offspring, self._score(self._offspring, told)
+        made, scores = self._offspring, self._score(self._offspring, told)
         self._cache.add(list(self._asked), told)
-        self.genomes, self.scores, self._offspring = offspring.genomes, scores, None
-        self._record(offspring, told)
+        self._offspring = None
+        if self.problem.rescored:
+            self._keep_contenders(made, scores)
+        living = self._reproduction.survivors(made, scores)
+        offspring, scores = made.part(living), scores[living]
+        self.genomes, self.scores, self._parents = offspring.genomes, scores, offspring.parents
+        replaced = len(made.genomes) > len(living)
+        self._record(offspring, told, int((~made.copied).sum()) if replaced else len(living))
         keys = [b"" if phenotype is None else phenotype.key for phenotype in offspring.phenotypes]
         ranked = merits(scores, True, self.problem.failure)
         self._ledger.add(offspring.parents, offspring.changed, ranked, keys)
@@ -389,9 +396,9 @@ class Evolution(Generic[P]):
             scores[members] = score
         return scores
 
-    def _record(self, offspring: Offspring[P], told: Scores) -> None:
+    def _record(self, offspring: Offspring[P], told: Scores, evaluations: int) -> None:
         totals = Totals(
-            self.totals.evaluations + len(offspring.genomes),
+            self.totals.evaluations + evaluations,
             self.totals.simulated + len(told),
             self.totals.steps + int(told["steps"].sum()),
         )
@@ -402,8 +409,6 @@ class Evolution(Generic[P]):
         )
         self.history.append(record)
         self._patience.see(self.history[-1].best)
-        if self.problem.rescored:
-            self._keep_contenders(offspring)
         fittest = int(np.lexsort((-self.scores["share"], self.scores["merit"]))[0])
         if self._best is None or _rank(self.scores[fittest]) < _rank(self._best.score[0]):
             phenotype = offspring.phenotypes[fittest]
@@ -411,12 +416,14 @@ class Evolution(Generic[P]):
             score = self.scores[fittest : fittest + 1].copy()
             self._best = Best(offspring.genomes[fittest].copy(), score, self.generation, program)
 
-    def _keep_contenders(self, offspring: Offspring[P]) -> None:
+    def _keep_contenders(self, offspring: Offspring[P], scores: Scores) -> None:
         """Keep the best programs so far, with what is known of them now."""
         for i, phenotype in enumerate(offspring.phenotypes):
-            if phenotype is not None and self.scores["merit"][i] < self.problem.failure:
-                score, known = self.scores[i : i + 1].copy(), self._contenders.get(phenotype.digest)
-                found = known or Best(offspring.genomes[i].copy(), score, self.generation, phenotype.program)
+            if phenotype is not None and scores["merit"][i] < self.problem.failure:
+                score, known = scores[i : i + 1].copy(), self._contenders.get(phenotype.digest)
+                found = known or Best(
+                    offspring.genomes[i].copy(), score, len(self.history), phenotype.program
+                )
                 self._contenders[phenotype.digest] = replace(found, score=score)
             elif phenotype is not None:
                 self._contenders.pop(phenotype.digest, None)
@@ -463,7 +470,8 @@ def run(
 def rehearse(settings: EvolutionSettings, mapper: Mapper, problem: Problem[P]) -> None:
     """Run two small generations without scores, so that everything is compiled before time is measured."""
     elites = min(settings.elites, 1)
-    small = settings.model_copy(update={"population": elites + 4, "elites": elites, "generations": 1})
+    sizes = {"population": elites + 4, "elites": elites, "generations": 1, "offspring": 0, "islands": 1}
+    small = settings.model_copy(update=sizes | {"replacement": "generational"})
     run(Evolution(mapper, problem, small, 0), lambda asked: problem.failed(len(asked)))
 
 

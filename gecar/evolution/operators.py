@@ -13,9 +13,11 @@ import numpy as np
 
 from gecar.errors import expected
 from gecar.evolution.crossover import Genomes, OnePoint, Subtree, VariableOnePoint
+from gecar.evolution.goals import MapElites, Nsga2
 from gecar.evolution.initialisation import Initialisation, Ptc2, Sensible, Uniform
 from gecar.evolution.lineage import MUTATION
 from gecar.evolution.mutation import Creep, Duplicate, Flip, Renew
+from gecar.evolution.replacement import Replacement, ReplaceWorst
 from gecar.evolution.selection import Lexicase, Selection, Tournament
 from gecar.evolution.settings import EvolutionSettings
 from gecar.language.mapping import Mapper
@@ -65,12 +67,15 @@ class Operators:
         Change children, one after the other: crossover, mutation and so on.
     grow
         Replace them after a restart with duplication; see `restart` of `EvolutionSettings`.
+    replace
+        Chooses who lives on among parents and children. None: the children, and as many elites as the settings say.
     """
 
     initialise: Initialisation
     select: Selection
     vary: tuple[Variation, ...]
     grow: tuple[Variation, ...] = (Duplicate(GROWN, LONGEST),)
+    replace: Replacement | None = None
 
     @classmethod
     def of(
@@ -81,18 +86,22 @@ class Operators:
         select: Selection | None = None,
         crossover: Variation | None = None,
         mutation: Variation | None = None,
+        replace: Replacement | None = None,
     ) -> Operators:
         """Return the operators that settings name, some of them replaced by those given."""
         initialise = initialise or INITIALISATIONS[settings.initialisation](settings)
-        select = select or SELECTIONS[settings.selection](settings)
+        goals = GOALS[settings.replacement](settings)
+        select = select or (goals.select if goals else SELECTIONS[settings.selection](settings))
+        replace = replace or (goals.replace if goals else REPLACEMENTS[settings.replacement])
         creep = (Creep(settings.creep_rate, settings.creep_most),) if settings.creep_rate else ()
         grow = (Duplicate(GROWN, LONGEST), *creep)
+        duplicate = (Duplicate(settings.duplication_rate, LONGEST),) if settings.duplication_rate else ()
         if settings.mutation == "renew" and mutation is None:
-            return cls(initialise, select, (Renew(initialise),), grow)
+            return cls(initialise, select, (Renew(initialise),), grow, replace)
         crossover = crossover or CROSSOVERS[settings.crossover](settings.crossover_rate)
         rate = None if settings.mutation == "one_used_codon" else settings.mutation_rate
         mutation = mutation or Flip(rate, within_used=settings.mutation != "codon")
-        return cls(initialise, select, (crossover, mutation, *creep), grow)
+        return cls(initialise, select, (crossover, mutation, *duplicate, *creep), grow, replace)
 
     def check(self, mapper: Mapper, n_cases: int) -> None:
         """Check that the operators suit a mapper and scores.
@@ -102,8 +111,14 @@ class Operators:
         InputError
             If one needs cases and there are none, or codons read from the first on and the mapper has genes.
         """
-        if getattr(self.select, "needs_cases", False) and n_cases == 0:
-            raise expected("selection", "lexicase without cases", "scores with cases, or tournament")
+        for chooser in (self.select, self.replace):
+            algorithm = getattr(chooser, "__self__", chooser)  # of a method, the object it belongs to
+            if getattr(algorithm, "needs_cases", False) and n_cases == 0:
+                found = f"{type(algorithm).__name__.lower()} without cases"
+                raise expected("selection", found, "scores with cases, or tournament")
+            if isinstance(algorithm, MapElites) and len(algorithm.ranges) != n_cases - 1:
+                found = f"{len(algorithm.ranges)} ranges for {n_cases} cases"
+                raise expected("map_elites", found, "a range for each case but the first")
         for operator in self.vary:
             if getattr(operator, "linear", False) and not mapper.linear:
                 found = f"{type(operator).__name__} for a {type(mapper).__name__}"
@@ -128,6 +143,12 @@ INITIALISATIONS: dict[str, Callable[[EvolutionSettings], Initialisation]] = {
 SELECTIONS: dict[str, Callable[[EvolutionSettings], Selection]] = {
     "tournament": lambda settings: Tournament(settings.tournament),
     "lexicase": lambda settings: Lexicase(),  # noqa: ARG005
+}
+REPLACEMENTS: dict[str, Replacement | None] = {"generational": None, "worst": ReplaceWorst()}
+GOALS: dict[str, Callable[[EvolutionSettings], Nsga2 | MapElites | None]] = {
+    **dict.fromkeys(REPLACEMENTS, lambda settings: None),  # noqa: ARG005
+    "nsga2": lambda settings: Nsga2(settings.tournament),
+    "map_elites": lambda settings: MapElites(settings.ranges, settings.population),
 }
 CROSSOVERS: dict[str, Callable[[float], Variation]] = {
     "one_point": OnePoint,

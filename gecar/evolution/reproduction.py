@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.evolution.crossover import Genomes
+from gecar.evolution.islands import Island, divide, lay_out
 from gecar.evolution.lineage import differs
 from gecar.evolution.operators import Operators, Variation, any_fresh, change_of
 from gecar.evolution.phenotypes import Phenotype, Phenotypes
@@ -31,7 +32,7 @@ class Offspring(Generic[P]):
     Attributes
     ----------
     genomes
-        Elites first (population, codons).
+        Of each island those that are copied first, such as elites (population, codons).
     phenotypes
         Their programs; None if a genome maps to none.
     parents
@@ -39,12 +40,28 @@ class Offspring(Generic[P]):
         those of a random individual are -1.
     changed
         Which operators changed the derivation (population,), as bits; see `gecar.evolution.lineage`.
+    copied, islands
+        Whether each is a copy, and its island (population,).
     """
 
     genomes: Genomes
     phenotypes: list[Phenotype[P] | None]
     parents: Int32s
     changed: Bytes
+    copied: npt.NDArray[np.bool_]
+    islands: Int32s
+
+    def part(self, places: Int32s) -> Offspring[P]:
+        """Return the individuals at some places."""
+        phenotypes = [self.phenotypes[place] for place in places.tolist()]
+        return Offspring(
+            self.genomes[places],
+            phenotypes,
+            self.parents[places],
+            self.changed[places],
+            self.copied[places],
+            self.islands[places],
+        )
 
 
 Drawn = tuple[Genomes, Int32s, Bytes]
@@ -93,7 +110,9 @@ class Reproduction(Generic[P]):
             genomes = self.operators.initialise(self.mapper, spawn(self.seed, generation, attempt, n))
             return genomes, np.full((n, 2), -1, np.int32), np.zeros(n, np.uint8)
 
-        return self._without_duplicates(draw, 0, known)
+        n, parts = settings.population, settings.islands
+        islands = np.repeat(np.arange(parts, dtype=np.int32), n // parts)
+        return self._without_duplicates(draw, np.zeros(n, bool), islands, known)
 
     def next(
         self,
@@ -103,7 +122,7 @@ class Reproduction(Generic[P]):
         known: Callable[[bytes], bool],
         grown: bool = False,
     ) -> Offspring[P]:
-        """Return the population that follows one with scores.
+        """Return the population that follows one with scores; with a replacement, the parents and their children.
 
         Parameters
         ----------
@@ -114,30 +133,59 @@ class Reproduction(Generic[P]):
         known
             Whether a program, by its digest, was scored before.
         grown
-            Whether children have a subtree duplicated instead of being crossed and mutated.
+            Whether children have a subtree duplicated instead of being crossed and mutated; they then replace all but
+            the elites.
         """
         operators = self.operators.grow if grown else self.operators.vary
         fresh = any_fresh(self.operators.vary)
-        n_elites = self.settings.elites
-        ranked = merits(scores, self.problem.partial_credit, self.problem.failure)
-        population = Population(genomes, scores, ranked, self.problem.cases(scores))
-        elites = np.argsort(ranked, kind="stable")[:n_elites].astype(np.int32)
+        population = self._population(genomes, scores)
+        settings = self.settings.model_copy(update={"islands": 1}) if grown else self.settings
+        all_live_on = self.operators.replace is not None and not grown
+        islands = divide(population.merits, settings, generation, all_live_on)
+        copied = np.concatenate([island.copied for island in islands])
+        layout = lay_out(islands)
 
         def draw(attempt: int) -> Drawn:
-            n = self.settings.population - n_elites
-            streams = spawn(self.seed, generation, attempt, n + n % 2)
-            chosen = self.operators.select(population, streams)
+            streams = spawn(self.seed, generation, attempt, sum(island.drawn for island in islands))
+            chosen = self._select(population, islands, streams)
             children, changed = self._vary(operators, genomes[chosen], streams)
             pairs = np.column_stack([chosen, chosen.reshape(-1, 2)[:, ::-1].ravel()])
             if fresh:
                 pairs[:] = -1
             return (
-                np.concatenate([genomes[elites], children[:n]]),
-                np.concatenate([np.column_stack([elites, elites]), pairs[:n]]),
-                np.concatenate([np.zeros(n_elites, np.uint8), changed[:n]]),
+                np.concatenate([genomes[copied], children])[layout.order],
+                np.concatenate([np.column_stack([copied, copied]), pairs])[layout.order],
+                np.concatenate([np.zeros(len(copied), np.uint8), changed])[layout.order],
             )
 
-        return self._without_duplicates(draw, n_elites, known)
+        return self._without_duplicates(draw, layout.copied, layout.islands, known)
+
+    def survivors(self, offspring: Offspring[P], scores: Scores) -> Int32s:
+        """Return the places of those that live on in what `next` returned, by their scores (population,)."""
+        n, parts = self.settings.population, self.settings.islands
+        if self.operators.replace is None or len(scores) == n:
+            return np.arange(len(scores), dtype=np.int32)
+        population = self._population(offspring.genomes, scores)
+        places = (np.flatnonzero(offspring.islands == island) for island in range(parts))
+        living = [here[self.operators.replace(population.part(here), n // parts)] for here in places]
+        return np.concatenate(living).astype(np.int32)
+
+    def _population(self, genomes: Genomes, scores: Scores) -> Population:
+        ranked = merits(scores, self.problem.partial_credit, self.problem.failure)
+        return Population(genomes, scores, ranked, self.problem.cases(scores))
+
+    def _select(self, population: Population, islands: Sequence[Island], streams: Streams) -> Int32s:
+        """Return the places of all children's parents, each from its own island (children drawn,)."""
+        if len(islands) == 1:
+            return self.operators.select(population, streams)
+        ends = np.cumsum([island.drawn for island in islands])
+        chosen = [
+            island.places[
+                self.operators.select(population.part(island.places), streams[end - island.drawn : end])
+            ]
+            for island, end in zip(islands, ends.tolist(), strict=True)
+        ]
+        return np.concatenate(chosen)
 
     def _vary(
         self, operators: tuple[Variation, ...], children: Genomes, streams: Streams
@@ -152,7 +200,11 @@ class Reproduction(Generic[P]):
         return children, changed
 
     def _without_duplicates(
-        self, draw: Callable[[int], Drawn], n_elites: int, known: Callable[[bytes], bool]
+        self,
+        draw: Callable[[int], Drawn],
+        copied: npt.NDArray[np.bool_],
+        islands: Int32s,
+        known: Callable[[bytes], bool],
     ) -> Offspring[P]:
         """Draw individuals, and replace duplicates, as often as the settings allow."""
         self._phenotypes.turn()
@@ -161,24 +213,24 @@ class Reproduction(Generic[P]):
         attempts = 0 if self.settings.duplicates == "kept" else self.settings.attempts
         simulated = known if self.settings.duplicates == "run" else _never
         for attempt in range(1, attempts + 1):
-            again = _duplicates(phenotypes, n_elites, simulated)
+            again = _duplicates(phenotypes, copied, simulated)
             if not again:
                 break
             drawn = draw(attempt)
             genomes[again], parents[again], changed[again] = (each[again] for each in drawn)
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
-        return Offspring(genomes, phenotypes, parents, changed)
+        return Offspring(genomes, phenotypes, parents, changed, copied, islands)
 
 
 def _duplicates(
-    phenotypes: list[Phenotype[P] | None], n_elites: int, simulated: Callable[[bytes], bool]
+    phenotypes: list[Phenotype[P] | None], copied: npt.NDArray[np.bool_], simulated: Callable[[bytes], bool]
 ) -> list[int]:
-    """Return the individuals, except elites, without a program or with one seen before."""
+    """Return the individuals, except copies, without a program or with one seen before."""
     seen: set[bytes] = set()
     found = []
     for i, phenotype in enumerate(phenotypes):
-        if i >= n_elites and (phenotype is None or phenotype.digest in seen or simulated(phenotype.digest)):
+        if not copied[i] and (phenotype is None or phenotype.digest in seen or simulated(phenotype.digest)):
             found.append(i)
         if phenotype is not None:
             seen.add(phenotype.digest)

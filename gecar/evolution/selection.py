@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,10 @@ class Population(NamedTuple):
     scores: Scores
     merits: Floats
     cases: Floats
+
+    def part(self, places: npt.NDArray[Any]) -> Population:
+        """Return the individuals at some places."""
+        return Population(*(each[places] for each in self))
 
 
 class Selection(Protocol):

@@ -53,6 +53,9 @@ class EvolutionSettings(BaseModel):
         Probability that a used codon that chooses a number changes to a neighbouring number.
     creep_most
         Largest mean number of such changes per child; inf: no limit.
+    duplication_rate
+        Probability that one of a child's subtrees is duplicated, in a child of at most
+        `gecar.evolution.operators.LONGEST` codons.
     duplicates
         ``kept``; or replaced, up to `attempts` times, if the same program is already in the ``generation``, or was
         scored before in the ``run``.
@@ -64,6 +67,18 @@ class EvolutionSettings(BaseModel):
     restart
         The new population. ``random``: random individuals. ``grown``: random individuals at the first restart, later
         the best programs so far with one of their subtrees duplicated.
+    replacement
+        Who lives on. ``generational``: the children, and the elites. ``worst``: the best of parents and children; with
+        one or two `offspring` a steady state (Whitley 1989). ``nsga2``, ``map_elites``: by several goals, the
+        problem's cases, which then also select parents; see `gecar.evolution.goals`.
+    offspring
+        Children per generation, where parents may live on. 0: as many as the population has individuals.
+    ranges
+        Of ``map_elites``: range of each case but the first; as many cells as the population has individuals.
+    islands
+        Number of parts of the population that evolve on their own, but for migrants.
+    migration_every
+        Generations after which the best of each island also joins the next island, the last one's the first (a ring).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -83,10 +98,16 @@ class EvolutionSettings(BaseModel):
     mutation_rate: Rate = 0.05
     creep_rate: Rate = 0.0
     creep_most: float = Field(math.inf, gt=0.0)
+    duplication_rate: Rate = 0.0
     duplicates: Literal["kept", "generation", "run"] = "kept"
     attempts: int = Field(10, ge=1, le=1_000)
     restart_after: int = Field(0, ge=0, le=1_000_000)
     restart: Literal["random", "grown"] = "random"
+    replacement: Literal["generational", "worst", "nsga2", "map_elites"] = "generational"
+    offspring: int = Field(0, ge=0, le=1_000_000)
+    ranges: tuple[tuple[float, float], ...] = ()
+    islands: int = Field(1, ge=1, le=1_000)
+    migration_every: int = Field(10, ge=1, le=1_000_000)
 
     @model_validator(mode="after")
     def _fits(self) -> EvolutionSettings:
@@ -99,7 +120,27 @@ class EvolutionSettings(BaseModel):
             raise ValueError(f"found population x codons = {size}, expected at most {MAX_CODONS_IN_ALL}")
         return self
 
+    @model_validator(mode="after")
+    def _parts_are_whole(self) -> EvolutionSettings:
+        children = self.offspring or self.population
+        if self.offspring and self.replacement == "generational":
+            raise ValueError(
+                "found offspring with replacement = generational, expected worst, nsga2 or map_elites"
+            )
+        if self.islands == 1:
+            return self
+        if self.replacement == "map_elites":
+            raise ValueError("found islands with replacement = map_elites, expected another replacement")
+        if self.population % self.islands or children % self.islands:
+            found = f"{self.islands} islands for {self.population} individuals and {children} children"
+            raise ValueError(f"found {found}, expected numbers that the islands share evenly")
+        if self.population // self.islands < max(self.elites, 1) + 2:
+            raise ValueError(
+                f"found {self.islands} islands, expected room for elites, a migrant and a child on each"
+            )
+        return self
+
     @property
     def evaluations(self) -> int:
         """Evaluations of a whole run, the first population included."""
-        return self.population * (self.generations + 1)
+        return self.population + self.generations * (self.offspring or self.population)

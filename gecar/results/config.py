@@ -23,6 +23,17 @@ from gecar.world.rollout import STEP_S
 Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 NOT_PART_OF_THE_RESULT = {"preset", "executor", "workers", "scheduler"}
 """Fields that may differ when a run is resumed: the result does not depend on them, or other fields say it."""
+ADDED = {
+    "start_from",
+    "replacement",
+    "offspring",
+    "ranges",
+    "islands",
+    "migration_every",
+    "duplication_rate",
+    "goals",
+}
+"""Fields that came later, and change nothing by default."""
 _ABOUT_THE_RUN = ("provenance", "fingerprints")
 
 
@@ -137,9 +148,16 @@ def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 def identify(config: Config, fingerprints: Mapping[str, str]) -> str:
     """Return a hash of all that the result depends on; a checkpoint belongs to one."""
-    told = {name: value for name, value in config.identity.items() if name != "start_from" or value}
-    text = json.dumps([told, dict(fingerprints)], sort_keys=True)  # as before there was start_from
+    told = _as_before(config.identity, Config)
+    told["search"] = _as_before(told["search"], Settings)
+    text = json.dumps([told, dict(fingerprints)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _as_before(table: Mapping[str, Any], model: type[BaseModel]) -> dict[str, Any]:
+    """Return a table as before there were `ADDED` fields, unless they say something: old checkpoints stay valid."""
+    plain = {name: model.model_fields[name].default for name in ADDED & model.model_fields.keys()}
+    return {name: value for name, value in table.items() if name not in plain or value != plain[name]}
 
 
 def as_toml(config: Config, tables: Mapping[str, Mapping[str, Any]]) -> str:
