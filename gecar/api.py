@@ -30,7 +30,7 @@ from gecar.results.config import Config, configure
 from gecar.results.run import Task, choose, finish, load_task, search, start
 from gecar.search.own_fitness import Fitness, FitnessEvaluator
 from gecar.search.programs import noise_seed
-from gecar.search.settings import DEFAULT_PRESET, PRESETS, Settings
+from gecar.search.settings import DEFAULT_PRESET, PRESETS, Settings, default_preset
 from gecar.world.course.course import Course, load_course
 from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Drive, Noise, Outcome, World
@@ -290,11 +290,9 @@ def _preset(settings: str | Mapping[str, Any] | Settings) -> tuple[str, Mapping[
     """Return a preset's name, and what differs from it."""
     if isinstance(settings, str):
         return settings, {}
-    if isinstance(settings, Settings):
-        settings = {
-            k: v for k, v in settings.model_dump().items() if v != getattr(PRESETS[DEFAULT_PRESET], k)
-        }
-    return DEFAULT_PRESET, settings
+    table = settings.model_dump() if isinstance(settings, Settings) else settings
+    name = default_preset(table)
+    return name, {k: v for k, v in table.items() if v != getattr(PRESETS[name], k, None)}
 
 
 def _task(

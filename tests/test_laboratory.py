@@ -1,5 +1,6 @@
 """Any problem: the worked examples of the documents, fitnesses of all kinds, operators and representations."""
 
+import json
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -34,17 +35,21 @@ def ones(bits: str) -> int:
 
 
 def test_the_page_s_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("pymoo", reason="needs pip install 'gecar[goals]'")
     page = (Path(__file__).parents[1] / "docs" / "laboratory.md").read_text()
     names: dict[str, object] = {}
     for code in re.findall(r"(?s)```python\n(.*?)```", page):
         exec(code, names)  # a page of this repository
     said = capsys.readouterr().out
-    square, keijzer, vladislavleva, ant, robot, two_aims, representations = said.splitlines()
+    square, keijzer, vladislavleva, ant, robot, front, two_aims, representations = said.splitlines()
     assert float(square.split()[-2]) < 1e-12
     assert float(keijzer.split()[1]) < 0.2
     assert float(vladislavleva.split()[1]) < 0.25
     assert int(ant.split()[0]) < 60
     assert 10 < float(robot) <= 10_000
+    errors, sizes = zip(*json.loads(front), strict=True)
+    assert list(errors) == sorted(errors)
+    assert list(sizes) == sorted(sizes, reverse=True)
     assert float(two_aims.strip("[]").split()[1]) >= 1
     assert all(float(word) < 89 for word in representations.split())
 

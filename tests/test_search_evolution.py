@@ -44,6 +44,9 @@ VARIANTS = {
         "creep_rate": 0.3,
         "creep_most": 2.0,
     },
+    "steady state": {"replacement": "worst", "offspring": 2},
+    "islands": {"islands": 4, "migration_every": 2, "duplicates": "generation"},
+    "islands, worst": {"islands": 2, "migration_every": 1, "replacement": "worst", "duplication_rate": 0.2},
     "lexicase, ptc2": {"selection": "lexicase", "initialisation": "ptc2", "duplicates": "generation"},
 }
 

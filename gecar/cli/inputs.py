@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gecar.errors import expected
 from gecar.language.program import Program
 from gecar.results.config import Config, configure, read_config
+from gecar.results.folder import FRONT_FOLDER
 from gecar.search.programs import noise_seed
 from gecar.world.course.course import course_names, load_course
 from gecar.world.robot import Robot, load_robot
@@ -21,7 +22,7 @@ _OF_A_WORLD = ("course", "robot", "time_limit_s", "step_s", "engine", "noise", "
 
 
 def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
-    """Find a program's file, and the settings of the run it comes from if it lies in a run's folder.
+    """Find a program's file, and the settings of the run it comes from if it lies in a run's folder, or its front.
 
     Of a run on several courses they name the first, that of eq. 1.
 
@@ -33,10 +34,11 @@ def find_program(place: Path) -> tuple[Path, dict[str, Any]]:
     file = place / "best.txt" if place.is_dir() else place
     if place.is_dir() and not file.is_file():
         raise expected(place, "a folder without best.txt", "a program file or a run's folder")
-    beside = file.parent / "config.toml"
-    if file.name != "best.txt" or not beside.is_file():
+    run = file.parent.parent if file.parent.name == FRONT_FOLDER else file.parent
+    of_run = file.name == "best.txt" or run != file.parent
+    if not of_run or not (run / "config.toml").is_file():
         return file, {}
-    config = read_run_config(file.parent)
+    config = read_run_config(run)
     settings = {name: getattr(config, name) for name in _OF_A_WORLD}
     return file, settings | {"course": course_names(config.course)[0]}
 

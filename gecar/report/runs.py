@@ -72,6 +72,21 @@ def came_to(group: Mapping[str, Any]) -> str:
     return with_share(group["median_s"], group["arrives_share"]) if np.isfinite(group["median_s"]) else ""
 
 
+def front_table(points: Sequence[Mapping[str, Any]], most: int = 20) -> Table:
+    """Return the programs on a front as a table for people; of many, some spread over all."""
+    best = [point for point in points if point["on_front"]]
+    table = Table("program", "time", "arrive", "energy", "length", box=None, pad_edge=False)
+    for k in np.unique(np.linspace(0, len(best) - 1, min(most, len(best))).astype(int)):
+        point = best[k]
+        table.add_row(
+            str(point["program"]), f"{point['time_s']:.2f} s", percent(1.0 - point["missed"]),
+            f"{point['energy_j']:.1f} J", str(point["length"]),
+        )  # fmt: skip
+    for column in table.columns:
+        column.justify = "right"
+    return table
+
+
 def summary_table(groups: Mapping[str, Mapping[str, Any]]) -> Table:
     """Return groups of runs as a table for people."""
     table = Table(

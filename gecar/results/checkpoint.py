@@ -36,7 +36,7 @@ def pack(state: State, configuration: str) -> bytes:
         What identifies the run's configuration.
     """
     kind = state.scores.dtype
-    sizes = len(state.best_genome), kind["arrival_s"].shape[0], kind["drawn_s"].shape[0]
+    sizes = len(state.best_genome), *(kind[name].shape[0] for name in ("arrival_s", "drawn_s", "costs"))
     arrays = {name: getattr(state, name) for name in _layout(*sizes)}
     arrays["lineage"] = np.frombuffer(zlib.compress(state.lineage.tobytes(), level=1), np.uint8)
     header = {
@@ -106,9 +106,9 @@ def _read(body: bytes, configuration: str, where: Path) -> State:
     return State(seed=header["seed"], best_generation=header["best_generation"], **arrays)
 
 
-def _layout(codons: int, n_arrivals: int, n_times: int) -> dict[str, np.dtype[Any]]:
+def _layout(codons: int, n_arrivals: int, n_times: int, n_costs: int = 0) -> dict[str, np.dtype[Any]]:
     """Return what a row of each array is, in the order they are written."""
-    score = score_type(n_arrivals, n_times)
+    score = score_type(n_arrivals, n_times, n_costs)
     return {
         "genomes": np.dtype(("u1", (codons,))),
         "scores": score,

@@ -27,8 +27,8 @@ from gecar.results.checkpoint import pack, unpack
 REQUIRED = ("generation", "best", "mean", "valid", "distinct", "evaluations", "wall_s")
 """Columns every history.csv has; see `gecar.evolution.history.Generation`."""
 
-UNSEEN_FILE = "unseen.csv"
-FILES = ("config.toml", "history.csv", "best.txt", "result.json", "checkpoint", UNSEEN_FILE)
+UNSEEN_FILE, FRONT_FILE, FRONT_FOLDER = "unseen.csv", "front.csv", "front"
+FILES = ("config.toml", "history.csv", "best.txt", "result.json", "checkpoint", UNSEEN_FILE, FRONT_FILE)
 
 
 def check_new(path: Path) -> None:

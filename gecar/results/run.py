@@ -30,11 +30,13 @@ from gecar.results.arrival import arrives
 from gecar.results.autosave import Saver
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
 from gecar.results.folder import UNSEEN_FILE, RunFolder, check_new
+from gecar.results.front import Front, measure_front, write_front
 from gecar.results.generalisation import drives_csv, drives_on, summed_up, unseen_courses
 from gecar.results.provenance import fingerprints, versions
 from gecar.search.batches import Batches
 from gecar.search.chance import chosen
 from gecar.search.evaluation import DriveEvaluator
+from gecar.search.goals import ranges_of
 from gecar.search.programs import RobotPrograms, noise_seed
 from gecar.world.course.course import load_courses
 from gecar.world.robot import load_robot
@@ -69,9 +71,10 @@ class Task:
             self.world,
             search.needs_arrivals,
             search.draws,
-            search.arrival_share,
+            search.required_share,
             self.config.seed,
             self.others,
+            search.goals,
         )
 
     @property
@@ -92,6 +95,10 @@ class Task:
             return Evolution(self.mapper, self.problem, search, self.config.seed, operators=self.operators)
         return Evolution.resume(state, self.mapper, self.problem, search, self.operators)
 
+    def front(self, evolution: Evolution[Program]) -> Front:
+        """Return the programs that a finished evolution with several goals ends with."""
+        return measure_front(evolution, self.world, self.config.search, self.others)
+
     @property
     def operators(self) -> Operators:
         """The operators that the settings name; the first genomes are those of the programs to start from.
@@ -101,12 +108,15 @@ class Task:
         InputError
             If the grammar has no derivation for one of them.
         """
-        plain = Operators.of(self.config.search)
+        search = self.config.search
+        if search.replacement == "map_elites" and not search.ranges:
+            search = search.model_copy(update={"ranges": ranges_of(self.world, search.goals[1:])})
+        plain = Operators.of(search)
         programs = [parse_program(text, "start_from") for text in self.config.start_from]
         if not programs:
             return plain
-        given = [genome_of(self.mapper, each, self.config.search.codons) for each in programs]
-        return Operators.of(self.config.search, initialise=Seeded(plain.initialise, np.array(given)))
+        given = [genome_of(self.mapper, each, search.codons) for each in programs]
+        return Operators.of(search, initialise=Seeded(plain.initialise, np.array(given)))
 
 
 def load_task(config: Config) -> Task:
@@ -248,9 +258,10 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     choose(task, evolution)
     folder.save(evolution.state(), task.configuration)  # who came from whom is asked of the program chosen
     folder.write_reports(evolution)
-    return folder.write_result(
-        evolution, measured(task, evolution) | _generalisation(task, evolution, folder)
+    more = (
+        measured(task, evolution) | _generalisation(task, evolution, folder) | _front(task, evolution, folder)
     )
+    return folder.write_result(evolution, more)
 
 
 def search(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
@@ -288,6 +299,15 @@ def _generalisation(task: Task, evolution: Evolution[Program], folder: RunFolder
     drives = drives_on(task.world, program, names, evolution.seed)
     folder.write(UNSEEN_FILE, drives_csv(drives))
     return {"unseen": {"courses": names} | summed_up(drives)}
+
+
+def _front(task: Task, evolution: Evolution[Program], folder: RunFolder) -> dict[str, Any]:
+    """Measure the programs that several goals end with; write them, and return what they reach."""
+    if not task.config.search.goals:
+        return {}
+    front = task.front(evolution)
+    write_front(folder, front)
+    return {"front": [point._asdict() for point in front.points]}
 
 
 def verified_on_pymunk(task: Task, evolution: Evolution[Program]) -> bool:

@@ -19,7 +19,7 @@ from gecar.search.courses import paces, spread
 from gecar.search.fitness import score_type
 from gecar.world.kernel.conditions import Conditions, impatient
 from gecar.world.perturbation import drawn_steps_s
-from gecar.world.rollout import Fleet, Outcome, World, goal_times
+from gecar.world.rollout import Driver, Fleet, Outcome, World, goal_times
 
 Opcodes = npt.NDArray[np.int32]
 Evaluator = Callable[[Sequence[Opcodes], Sequence[int], float, int], Scores]
@@ -52,6 +52,8 @@ class DriveEvaluator:
         Where the conditions come from.
     others
         The same robot on further courses: drawn conditions are spread over all (`gecar.search.courses`).
+    goals
+        What programs are compared by, if by several (`gecar.search.goals`): then slow programs race on.
     """
 
     world: World
@@ -60,6 +62,7 @@ class DriveEvaluator:
     required_share: float = 0.95
     seed: int = 0
     others: tuple[World, ...] = ()
+    goals: tuple[str, ...] = ()
 
     def __call__(
         self,
@@ -71,9 +74,11 @@ class DriveEvaluator:
         """Return a score for each program, dtype `score_type`."""
         scores = self._nominal(programs, seeds)
         if self.draws > 1:
-            self._race(scores, programs, seeds, to_beat_s, generation)
+            self._race(scores, programs, seeds, math.inf if self.goals else to_beat_s, generation)
             for score in scores:
                 pool(score, self.required_share)
+        if self.goals:
+            self._count_costs(scores, programs, seeds)
         return scores
 
     @property
@@ -82,7 +87,8 @@ class DriveEvaluator:
         return len(self.world.course.sequence) if self.keep_arrivals else 0
 
     def _nominal(self, programs: Sequence[Opcodes], seeds: Sequence[int]) -> Scores:
-        scores = np.zeros(len(programs), score_type(self.n_arrivals, n_times(self.draws)))
+        kind = score_type(self.n_arrivals, n_times(self.draws), 2 if self.goals else 0)
+        scores = np.zeros(len(programs), kind)
         pairs = np.stack([np.arange(len(programs)), np.zeros(len(programs))], axis=1)
         summary, arrival = self._fleet_on(0).drive(programs, self._world_says, pairs, seeds)
         for field in ("outcome", "checkpoints", "time_s", "steps"):
@@ -160,6 +166,17 @@ class DriveEvaluator:
         np.add.at(scores["steps"], k, summary["steps"])
         return goal_times(summary)
 
+    def _count_costs(self, scores: Scores, programs: Sequence[Opcodes], seeds: Sequence[int]) -> None:
+        """Set energy and length; the energy by driving once more, where it is a goal and the program does not fail."""
+        for score, opcodes, seed in zip(scores, programs, seeds, strict=True):
+            driven = "energy" in self.goals and score["merit"] < UNSOLVED
+            energy_j = self._driver.simulate(opcodes, seed).energy_j if driven else np.nan
+            score["costs"] = energy_j, len(opcodes)
+
+    @cached_property
+    def _driver(self) -> Driver:
+        return Driver(self.world)
+
     def _shares(self, arrival: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """How far along the course drives came: tiles in order, and among equals who was there sooner, 0..1."""
         reached = ~np.isnan(arrival)
@@ -195,7 +212,7 @@ class DriveEvaluator:
         """Pickle without what can be made again: a course without its raster is 2 kB instead of 3 MB."""
         bare, *others = (replace(world, course=replace(world.course)) for world in self._worlds)
         return DriveEvaluator, (
-            bare, self.keep_arrivals, self.draws, self.required_share, self.seed, tuple(others),
+            bare, self.keep_arrivals, self.draws, self.required_share, self.seed, tuple(others), self.goals,
         )  # fmt: skip
 
 

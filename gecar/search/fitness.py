@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
+def score_type(n_arrivals: int = 0, n_times: int = 0, n_costs: int = 0) -> np.dtype[np.void]:
     """Return the dtype of scores.
 
     Parameters
@@ -14,6 +14,8 @@ def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
         How many tiles' arrival times to keep; 0 unless selection wants them.
     n_times
         How many drives under drawn conditions to keep the times of.
+    n_costs
+        How many costs to keep: 2, or 0 unless there are several goals.
 
     Returns
     -------
@@ -24,7 +26,7 @@ def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
         each tile of the course's sequence was reached [s], nan where it was not. ``fastest_s``, ``slowest_s``: the
         least and the most time to GOAL of the nominal robot at the steps it was driven at so far [s]; ``slowest_s`` is
         inf where it missed GOAL at one. ``drawn_s``: times to GOAL under drawn conditions [s], inf where it was missed,
-        nan where nothing was driven.
+        nan where nothing was driven. ``costs``: electrical energy of the nominal drive [J], and length [instructions].
     """
     return np.dtype(
         [
@@ -39,5 +41,6 @@ def score_type(n_arrivals: int = 0, n_times: int = 0) -> np.dtype[np.void]:
             ("fastest_s", "<f8"),
             ("slowest_s", "<f8"),
             ("drawn_s", "<f4", (n_times,)),
+            ("costs", "<f8", (n_costs,)),
         ]
     )

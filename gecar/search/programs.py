@@ -15,6 +15,7 @@ from gecar.language.opcodes import LINE, MAX_DUTY_PCT, MOTOR_UNTIL, OP, A, B
 from gecar.language.program import Program
 from gecar.search.chance import add_drives, n_times, wants_more
 from gecar.search.fitness import score_type
+from gecar.search.goals import goals_of
 from gecar.search.settings import Settings
 
 
@@ -32,6 +33,8 @@ class RobotPrograms(Problem[Program]):
         As `arrival_share` and `checkpoint_credit` of `gecar.search.settings.Settings`.
     duty_cap_pct
         Duty beyond which commands do the same [%]: programs that differ only there are one program.
+    goals
+        What programs are compared by, if by several; see `gecar.search.goals`.
     """
 
     n_arrivals: int = 0
@@ -39,17 +42,18 @@ class RobotPrograms(Problem[Program]):
     arrival_share: float = 1.0
     partial_credit: bool = False
     duty_cap_pct: int = MAX_DUTY_PCT
+    goals: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, settings: Settings, n_arrivals: int = 0, duty_cap_pct: int = MAX_DUTY_PCT) -> RobotPrograms:
         """Return the problem that an evolution with these settings solves."""
         draws, credit = n_times(settings.draws), settings.checkpoint_credit
-        return cls(n_arrivals, draws, settings.arrival_share, credit, duty_cap_pct)
+        return cls(n_arrivals, draws, settings.required_share, credit, duty_cap_pct, settings.goals)
 
     @property
     def score_type(self) -> np.dtype[np.void]:
         """See `gecar.search.fitness.score_type`."""
-        return score_type(self.n_arrivals, self.n_times)
+        return score_type(self.n_arrivals, self.n_times, 2 if self.goals else 0)
 
     @property
     def failure(self) -> float:
@@ -63,8 +67,8 @@ class RobotPrograms(Problem[Program]):
 
     @property
     def n_cases(self) -> int:
-        """Checkpoints and GOAL."""
-        return self.n_arrivals
+        """Goals; or, for ``lexicase``, checkpoints and GOAL."""
+        return len(self.goals) or self.n_arrivals
 
     def read(self, derivation: Derivation) -> Program | None:
         """Return the program; None where the text is none."""
@@ -90,7 +94,9 @@ class RobotPrograms(Problem[Program]):
         return _without_drives(super().from_merits(merits))
 
     def cases(self, scores: Scores) -> Floats:
-        """Return the times from checkpoint to checkpoint [s]."""
+        """Return what programs reach of each goal; or the times from checkpoint to checkpoint [s]."""
+        if self.goals:
+            return goals_of(scores, self.goals)
         return segment_times(scores["arrival_s"]) if self.n_arrivals else super().cases(scores)
 
     def wants_more(self, score: np.void) -> bool:

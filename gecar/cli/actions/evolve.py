@@ -16,12 +16,13 @@ from gecar.cli.progress import Watch
 from gecar.compiled import is_cold, mark_warm
 from gecar.evolution.scores import UNSOLVED
 from gecar.report.drive import arrival_of, sentence_of, standing_of
-from gecar.report.runs import courses_title, effort_of
+from gecar.report.runs import courses_title, effort_of, front_table
 from gecar.results.config import configure, merged, read_config
+from gecar.results.folder import FRONT_FOLDER
 from gecar.results.generalisation import sentence
 from gecar.results.run import Started, finish, resume, start
 from gecar.search.chance import AS_GOOD
-from gecar.search.settings import DEFAULT_PRESET
+from gecar.search.settings import default_preset
 from gecar.world.rollout import simulate
 
 
@@ -31,7 +32,7 @@ def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: b
     Parameters
     ----------
     file
-        Settings; where neither it nor the options name a preset, it is `DEFAULT_PRESET`.
+        Settings; where neither it nor the options name a preset, it is that of `default_preset`.
     changes
         Options, laid over them.
     out
@@ -44,7 +45,9 @@ def begin(file: Path | None, changes: dict[str, Any], out: Path | None, again: b
     InputError
         As `gecar.results.run.start` or `resume`.
     """
-    table = merged({"preset": DEFAULT_PRESET} | (read_config(file) if file else {}), changes)
+    read = read_config(file) if file else {}
+    begun = {"preset": default_preset({**read.get("search", {}), **changes.get("search", {})})} | read
+    table = merged(begun, changes)
     wanted = configure(table, file or "options")
     folder = out or Path("runs") / f"{wanted.course_name}-{wanted.preset}-seed{wanted.seed}"
     return resume(folder, table if file else changes) if again else start(wanted, folder)
@@ -132,9 +135,22 @@ def _tell(output: Output, started: Started, result: dict[str, Any], pictures: li
             output.print(f"The time is that on the first course. {sentence(result['unseen'])}")
         same = "ends the same" if result["verified_on_pymunk"] else "ENDS OTHERWISE; please report it"
         output.print(f"With pymunk moving the body, the drive {same}.")
+    if "front" in result:
+        _tell_front(output, started, result["front"])
     output.print(effort_of(result))
     output.print(f"\nResults:  {folder}")
     for picture in pictures:
         output.print(f"Picture:  {picture}")
     if best.program is not None:
         output.print(f"Film it:  {command()} simulate {folder} --animate drive.gif")
+
+
+def _tell_front(output: Output, started: Started, points: list[dict[str, Any]]) -> None:
+    """Print the programs that no other one of the run surpasses."""
+    best = [point["program"] for point in points if point["on_front"]]
+    names = ", ".join(started.task.config.search.goals)
+    output.print(f"\nPareto front of {names}: {len(best)} of {len(points)} programs\n", style="bold")
+    if best:
+        output.print(front_table(points))
+        place = started.folder.path / FRONT_FOLDER / f"{best[0]}.txt"
+        output.print(f"\nEach is a program: {command()} simulate {place}\n")

@@ -7,9 +7,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gecar.cli.inputs import build_world, drive_seed, find_program, read_run_config
 from gecar.cli.output import Output
 from gecar.errors import expected
+from gecar.evolution.goals import MapElites
 from gecar.evolution.lineage import Member
 from gecar.language.program import Program, read_program
 from gecar.plots.courses.many import courses_figure
@@ -19,6 +22,7 @@ from gecar.plots.runs.compare_runs import compare_runs
 from gecar.plots.runs.convergence import Reference, convergence
 from gecar.plots.runs.derivation_tree import tree_of
 from gecar.plots.runs.evolution_film import Champion, film_evolution
+from gecar.plots.runs.front import archive_figure, front_figure
 from gecar.plots.runs.genealogy import genealogy
 from gecar.plots.runs.population import population_figure
 from gecar.plots.style import save
@@ -27,9 +31,11 @@ from gecar.report.runs import came_to, group_names, run_detail, run_title, summa
 from gecar.results.ancestry import Ancestry, read_ancestry
 from gecar.results.arrival import arriving, percent, share_of, shares
 from gecar.results.config import Config
-from gecar.results.folder import UNSEEN_FILE, read_history, read_result
+from gecar.results.folder import FRONT_FILE, UNSEEN_FILE, read_history, read_result
+from gecar.results.front import read_front
 from gecar.results.generalisation import CourseDrive, read_drives, summed_up
 from gecar.results.run import Task, load_task
+from gecar.search.goals import GOALS
 from gecar.world.course.course import course_names, load_course, load_courses
 from gecar.world.perturbation import under_drawn_conditions
 from gecar.world.robot import load_robot
@@ -40,7 +46,7 @@ SHOWN = 20
 
 
 def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
-    """Draw a run's convergence, its best program's drive, and the unseen courses that it was tested on.
+    """Draw a run's convergence, its best program's drive, unseen courses that it was tested on, and its front.
 
     Parameters
     ----------
@@ -66,7 +72,32 @@ def draw_run(folder: Path, out: Path | None = None) -> list[Path]:
         drawn.append(draw_trajectory(folder, target / "trajectory.png"))
     if (folder / UNSEEN_FILE).is_file():
         drawn.append(draw_drives(read_drives(folder / UNSEEN_FILE), target / "unseen.png"))
+    if (folder / FRONT_FILE).is_file() and read_front(folder):
+        drawn.append(draw_front(folder, target / "front.png"))
     return drawn
+
+
+def draw_front(folder: Path, target: Path) -> Path:
+    """Draw the programs that a run with several goals ended with."""
+    points, config = read_front(folder), read_run_config(folder)
+    goals = [GOALS[name] for name in config.search.goals]
+    values = np.array([[getattr(point, goal.field) * goal.scale for goal in goals] for point in points])
+    labels, best = [goal.label for goal in goals], [point.on_front == 1 for point in points]
+    detail = run_detail(config, read_result(folder))
+    archive = getattr(load_task(config).operators.replace, "__self__", None)
+    if isinstance(archive, MapElites) and len(goals) == 3:
+        title = f"The best program in each of {len(points)} cells"
+        ends = [
+            (low * goal.scale, high * goal.scale)
+            for goal, (low, high) in zip(goals[1:], archive.ranges, strict=True)
+        ]
+        return save(archive_figure(values, ends, archive.along, labels, title, detail), target)
+    names = ", ".join(goal.name for goal in goals)
+    title = f"Pareto front of {names}: {sum(best)} of {len(points)} programs"
+    return save(
+        front_figure(values, best, labels, title, f"{detail} · grey: dominated, or arrives too rarely"),
+        target,
+    )
 
 
 def draw_drives(drives: Sequence[CourseDrive], target: Path, kind: str = "unseen courses") -> Path:

@@ -38,7 +38,13 @@ def evolve(
                        help="Settings, as in the config.toml of a run's folder; options override them."),
     ] = None,
     preset: Annotated[
-        str | None, _search("--preset", "Search settings: better, paper (Table 4) or random.", "better", "NAME")
+        str | None,
+        _search("--preset", "Search settings: better, paper (Table 4), random, nsga2 or map_elites.",
+                "better; with goals nsga2", "NAME"),
+    ] = None,
+    goals: Annotated[
+        str | None,
+        _search("--goals", "Several goals: two or more of time, arrival, energy, length.", metavar="GOAL,GOAL"),
     ] = None,
     population: Annotated[int | None, _search("--population", "Programs per generation; paper: 200.")] = None,
     generations: Annotated[
@@ -117,6 +123,7 @@ def evolve(
       gecar evolve runs/hairpin-7/config.toml --seed 8
       gecar evolve --course random:1-20 --grammar memory
       gecar evolve --course hairpin --start-from best.txt
+      gecar evolve --goals time,length,energy
       gecar evolve --resume --out runs/hairpin-7
     """
     from gecar.parallel.executors import prepare_workers
@@ -127,7 +134,7 @@ def evolve(
     search = {
         "population": population, "generations": generations, "codons": codons, "elites": elites,
         "tournament": tournament, "crossover_rate": crossover_rate, "mutation_rate": mutation_rate,
-        "draws": draws, "arrival_share": share,
+        "draws": draws, "arrival_share": share, "goals": goals.split(",") if goals else None,
     }  # fmt: skip
     options: dict[str, Any] = {
         "preset": preset, "course": course, "grammar": grammar, "robot": robot, "seed": seed, "workers": workers,
