@@ -27,6 +27,7 @@ from gecar.reality.recordings.recording import Case, Recording, read_case
 from gecar.reality.verdict import Verdict
 from gecar.results.arrival import arrives
 from gecar.results.config import Config, configure
+from gecar.results.front import Front, load_front
 from gecar.results.run import Task, choose, finish, load_task, search, start
 from gecar.search.own_fitness import Fitness, FitnessEvaluator
 from gecar.search.programs import noise_seed
@@ -89,6 +90,8 @@ class Run(Displayed):
         Random seed of the run.
     folder
         Folder of its files, or None.
+    front
+        With several goals, the programs of the last population, measured; else None.
     """
 
     best: Best[Program]
@@ -96,6 +99,7 @@ class Run(Displayed):
     world: World
     seed: int
     folder: Path | None = None
+    front: Front | None = None
 
     @property
     def program(self) -> Program:
@@ -189,13 +193,16 @@ def evolve(
     task = _task(config, **objects)
     if fitness is not None and task.others:
         raise expected("course", f"{config.course}", "one course, with a fitness of your own")
+    if fitness is not None and config.search.goals:
+        raise expected("goals", ", ".join(config.search.goals), "none, with a fitness of your own")
     evolution = task.evolution()
     if fitness is None:
         search(task, evolution, tell)
         choose(task, evolution)
     else:
         _search_by(fitness, task, evolution, tell)
-    return Run(evolution.best, evolution.history, task.world, seed)
+    front = task.front(evolution) if config.search.goals else None
+    return Run(evolution.best, evolution.history, task.world, seed, front=front)
 
 
 def simulate(
@@ -323,7 +330,8 @@ def _evolve_into(
     started = start(config, out)
     finish(started, tell)
     evolution = started.evolution
-    return Run(evolution.best, evolution.history, started.task.world, config.seed, out)
+    front = load_front(out) if config.search.goals else None
+    return Run(evolution.best, evolution.history, started.task.world, config.seed, out, front)
 
 
 def _search_by(fitness: Fitness, task: Task, evolution: Evolution[Program], tell: Tell) -> None:

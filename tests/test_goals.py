@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+import gecar
 from gecar.errors import InputError
 from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.fitness import Fitness
@@ -126,6 +127,21 @@ def test_no_point_on_a_front_is_surpassed(gecar, tmp_path) -> None:
     for point, mine in zip(points, reached, strict=True):
         surpassed = ((reached <= mine).all(axis=1) & (reached < mine).any(axis=1)).any()
         assert bool(point.on_front) != surpassed
+
+
+def test_python_returns_the_front_of_its_folder(tmp_path) -> None:
+    settings = SMALL | {"goals": ["time", "length"]}
+    given = {"settings": settings, "start_from": [FOLLOWER], "workers": 1}
+    run, kept = gecar.evolve(**given), gecar.evolve(**given, out=tmp_path / "run")
+    assert run.front.points == kept.front.points
+    assert [str(program) for program in run.front.programs] == [
+        str(program) for program in kept.front.programs
+    ]
+    assert FOLLOWER.strip() in {str(program).strip() for program in run.front.programs}
+    with pytest.raises(
+        InputError, match="goals: found time, length, expected none, with a fitness of your own"
+    ):
+        gecar.evolve(**given, fitness=lambda drive: drive.time_s)
 
 
 @pytest.mark.parametrize(

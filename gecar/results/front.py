@@ -16,7 +16,7 @@ from gecar.evolution.ask_tell import Evolution
 from gecar.evolution.goals import MapElites, fronts
 from gecar.evolution.phenotypes import Phenotypes
 from gecar.files import read_text
-from gecar.language.program import Program
+from gecar.language.program import Program, read_program
 from gecar.results.folder import FRONT_FILE, FRONT_FOLDER, RunFolder
 from gecar.search.chance import REPORT, REPORTED_DRAWS, Arrivals, arrivals
 from gecar.search.goals import GOALS
@@ -155,6 +155,12 @@ def read_front(folder: Path) -> list[Point]:
     if not rows or rows[0] != wanted:
         raise expected(path, rows[0][:60] if rows else "nothing", wanted)
     return [_point(row, f"{path}, line {k}") for k, row in enumerate(rows[1:], 2)]
+
+
+def load_front(folder: Path) -> Front:
+    """Read a run's front.csv, and its programs."""
+    points = read_front(folder)
+    return Front(points, [read_program(folder / FRONT_FOLDER / f"{point.program}.txt") for point in points])
 
 
 def _point(row: str, where: str) -> Point:

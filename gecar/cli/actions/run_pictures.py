@@ -83,7 +83,8 @@ def draw_front(folder: Path, target: Path) -> Path:
     goals = [GOALS[name] for name in config.search.goals]
     values = np.array([[getattr(point, goal.field) * goal.scale for goal in goals] for point in points])
     labels, best = [goal.label for goal in goals], [point.on_front == 1 for point in points]
-    detail = run_detail(config, read_result(folder))
+    spent = read_result(folder)["evaluations"]
+    detail = f"preset {config.preset}, seed {config.seed} · {spent:,} evaluations"
     archive = getattr(load_task(config).operators.replace, "__self__", None)
     if isinstance(archive, MapElites) and len(goals) == 3:
         title = f"The best program in each of {len(points)} cells"
