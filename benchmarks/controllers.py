@@ -169,7 +169,7 @@ def row(name: str, course: str, results: Sequence[dict[str, Any]]) -> list[str]:
     def said(time_s: float) -> str:
         return f"{time_s:.2f}" if math.isfinite(time_s) else "-"
 
-    spread = f"{said(times.min())} to {said(times.max())}"
+    spread = f"{said(times.min())} to {said(times.max())}" if np.isfinite(times).any() else "-"
     middle = float(quantile(times, 0.5))
     solved = f"{np.isfinite(times).sum()}/{len(times)}"
     return [course, name, solved, said(middle), spread, percent(float(np.median(shares)))]
