@@ -161,6 +161,20 @@ def test_ctrl_c_before_the_first_generation_is_no_fault(
     assert capsys.readouterr().err.startswith("stopped before the first generation. Go on with: ")
 
 
+def test_ctrl_c_while_the_best_program_is_measured_says_how_to_go_on(
+    tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    with monkeypatch.context() as patch:
+        patch.setattr(signal, "signal", lambda *_: None)
+        patch.setattr("gecar.results.run.measured", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            finish(start(configure(SHORT), out))
+    assert capsys.readouterr().err.startswith("stopped after generation 6 of 6; it is saved. Go on with: ")
+    finish(resume(out))
+    assert outputs(out) == outputs(undisturbed)
+
+
 def test_a_finished_run_may_be_resumed_and_stays_as_it_is(stopped: Path, undisturbed: Path) -> None:
     for _ in range(2):
         finish(resume(stopped))

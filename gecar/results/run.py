@@ -247,6 +247,16 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     try:
         if not evolution.finished:
             search(task, evolution, saved)
+        saver.save()
+        choose(task, evolution)
+        folder.save(evolution.state(), task.configuration)  # who came from whom is asked of the program chosen
+        folder.write_reports(evolution)
+        more = (
+            measured(task, evolution)
+            | _generalisation(task, evolution, folder)
+            | _front(task, evolution, folder)
+        )
+        return folder.write_result(evolution, more)
     except KeyboardInterrupt:
         saver.leave()
         raise
@@ -254,14 +264,6 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
         with suppress(InputError):  # the first error is the one to tell
             saver.save()
         raise
-    saver.save()
-    choose(task, evolution)
-    folder.save(evolution.state(), task.configuration)  # who came from whom is asked of the program chosen
-    folder.write_reports(evolution)
-    more = (
-        measured(task, evolution) | _generalisation(task, evolution, folder) | _front(task, evolution, folder)
-    )
-    return folder.write_result(evolution, more)
 
 
 def search(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
