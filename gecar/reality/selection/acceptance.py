@@ -21,6 +21,7 @@ from gecar.reality.selection.thresholds import (
     SIGNIFICANCE,
     STEADY,
     STOPPED,
+    WORSE,
 )
 from gecar.world.effects import BY_ID
 
@@ -53,7 +54,8 @@ def is_worthwhile(model: Model, effect: str) -> bool:
 def worsens(problem: Problem, step: Step, sizes: Sizes | None = None) -> bool:
     """Whether whole drives come out worse with a step's effect than without, where that is material.
 
-    They do where an effect needs small changes of other constants to make up for it, which no robot file has.
+    They do where an effect needs small changes of other constants to make up for it, which no robot file has. Of two
+    causes that make up for each other, the first shows as much afterwards as before, in other channels.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def worsens(problem: Problem, step: Step, sizes: Sizes | None = None) -> bool:
     """
     left = (sizes or problem.sizes).left
     before, now = (problem.material.times(left(model.physics)) for model in (step.base, step.model))
-    return now > max(before, 1.0)
+    return now > max(WORSE * before, 1.0)
 
 
 def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:

@@ -85,6 +85,12 @@ MEASURED = Threshold(
     "hand",
 )
 
+WORSE = Threshold(
+    1.25,
+    "times the error of whole drives, if material, from which on an effect makes them worse",
+    "5 cases with a background: a slow clock that imitates short misfits 1.7 to 2.3, causes below 1",
+)
+
 # -- What a simulation is off by
 SMALL = Threshold(
     0.3,
