@@ -64,6 +64,7 @@ class Estimator:
     ) -> None:
         self.residuals, self.robot, self.rng, self.discrepancy = residuals, robot, rng, discrepancy
         self.blocks = Blocks(residuals.index)
+        self.on_bench = all(r.recording.setup.rig == "bench" for r in residuals.recordings)
         self._cache: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
 
     def under(self, discrepancy: Discrepancy | None) -> Estimator:
@@ -111,7 +112,8 @@ class Estimator:
         parameters = free(self.robot, effects)
         residual = self.residual(parameters)
         start = parameters.vector(values)
-        found = least_squares(residual, start, parameters.bounds, parameters.probes, rounds)
+        bounds, probes = parameters.bounds, parameters.probes
+        found = least_squares(residual, start, bounds, probes, rounds, past_jumps=self.on_bench)
         energy = self.blocks.excess_energy(found.errors)
         return Model(tuple(effects), parameters, found, energy)
 

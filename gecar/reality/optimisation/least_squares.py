@@ -18,6 +18,9 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 KNEE = 4.0  # standard deviations beyond which a residual counts linearly
 RIDGE = 1e-6  # of the diagonal, where some coordinates do the same
+LIGHT = 1e-3  # damping at first
+STUCK = 1.0  # damping after which a step that does not help is one across a jump, or none is needed
+WORTH_A_JUMP = 0.01  # share of the cost that a step across one gains, or it is not the end of something
 HALVINGS = 5  # of a step that goes too far
 TOGETHER = 32  # vectors of residuals, a megabyte or less each
 
@@ -101,6 +104,7 @@ def least_squares(
     probes: Array,
     rounds: int = 12,
     close: float = 1e-3,
+    past_jumps: bool = False,
 ) -> Minimum:
     """Minimise the robust cost of a residual function.
 
@@ -116,12 +120,14 @@ def least_squares(
         Most Jacobians to take.
     close
         Stop when a round lowers the cost by less than this share of it, and by less than 0.05.
+    past_jumps
+        Whether to go on by fewer coordinates where a step of all of them ends at a jump.
     """
     low, high = bounds
     z = np.clip(start, low, high)
     errors = residual(z)
     now = cost(errors)
-    damping = 1e-3
+    damping = LIGHT
     for _ in range(rounds):
         slopes = jacobian(residual, z, errors, probes, high)
         w = weights(errors)[:, None]
@@ -138,13 +144,42 @@ def least_squares(
                 break
             damping *= 6.0
         if before - now < max(close * 1e-2 * before, 0.02):
-            break
+            found = (
+                _past_a_jump(residual, z, normal, gradient, bounds) if past_jumps and damping > STUCK else z
+            )
+            tried = residual(found)
+            if cost(tried) > (1.0 - WORTH_A_JUMP) * before:
+                break
+            z, errors, now, damping = found, tried, cost(tried), LIGHT
     return Minimum(z, errors, now)
 
 
-def _step(z: Array, normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
-    """Return the next vector; coordinates at an active bound stay there."""
+def _past_a_jump(
+    residual: Residual, z: Array, normal: Array, gradient: Array, bounds: tuple[Array, Array]
+) -> Array:
+    """Return the best vector that steps of a coordinate alone, or of all the others, lead to.
+
+    Where a threshold makes residuals jump, a step of all coordinates fails, however short, because of one of them.
+    """
+    alone = np.eye(len(z), dtype=bool)
+    tried = np.array([_step(z, normal, gradient, LIGHT, *bounds, held) for held in (*alone, *~alone)])
+    best: Array = tried[int(np.argmin(cost_of_each(residual, tried)))]
+    return best
+
+
+def _step(
+    z: Array,
+    normal: Array,
+    gradient: Array,
+    damping: float,
+    low: Array,
+    high: Array,
+    held: npt.NDArray[np.bool_] | None = None,
+) -> Array:
+    """Return the next vector; coordinates that are held, or at an active bound, stay there."""
     free = ~(((z <= low) & (gradient > 0.0)) | ((z >= high) & (gradient < 0.0)))
+    if held is not None:
+        free &= ~held
     move = np.zeros_like(z)
     if free.any():
         block = normal[np.ix_(free, free)]

@@ -80,8 +80,10 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     if problem.on_bench:
         stage = [step for step in stage if step.worthwhile]
     best = max((step.gain for step in stage), default=0.0)
-    enough = [s for s in stage[:RUNNERS_UP] if s.gain >= max(PRICE, COMPETING * best) and not stopped(s)]
-    return enough if problem.on_bench else [step for step in enough if not worsens(problem, step)]
+    enough = [step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best)]
+    if problem.on_bench:
+        return [step for step in enough if not stopped(step, own=True)]
+    return [step for step in enough if not (stopped(step) or worsens(problem, step))]
 
 
 def imitates_dry_friction(problem: Problem, model: Model) -> bool:
@@ -92,13 +94,18 @@ def imitates_dry_friction(problem: Problem, model: Model) -> bool:
     return model.values[BREAKAWAY]["speed_rad_s"] > BREAKAWAY_SPEED * fastest > 0.0
 
 
-def stopped(step: Step) -> bool:
-    """Whether any size of a step's model grew until a bound stopped it."""
-    parameters, z = step.model.parameters, step.model.z
+def stopped(step: Step, own: bool = False) -> bool:
+    """Whether any size of a step's model grew until a bound stopped it, or any of its own effect alone."""
+    return at_a_bound(step.model, step.effect if own else None)
+
+
+def at_a_bound(model: Model, effect: str | None = None) -> bool:
+    """Whether any size of a model, or of one of its effects, grew until a bound stopped it."""
+    parameters, z = model.parameters, model.z
     return any(
         _is_stopped(parameters, z, k)
         for k, c in enumerate(parameters.coordinates)
-        if c.parameter.worthwhile > 0.0 or c.inverse
+        if (c.parameter.worthwhile > 0.0 or c.inverse) and effect in (None, c.effect.id)
     )
 
 

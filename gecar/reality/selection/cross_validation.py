@@ -9,47 +9,66 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.optimisation.least_squares import Minimum, costs, left_out_costs
+from gecar.reality.optimisation.least_squares import (
+    Minimum,
+    Residual,
+    costs,
+    least_squares,
+    left_out_costs,
+    weights,
+)
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.thresholds import NEGLIGIBLE, ONE_FOLD
+from gecar.reality.selection.thresholds import APART, NEGLIGIBLE, ONE_FOLD, PRICE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
+REFITS = 3  # iterations of a fit without a fold, which begins close to its end
 
 
 def judged(problem: Problem, step: Step) -> Step:
     """Return a step with its gain on left-out recordings, and with what the null distribution says of that."""
-    gains = left_out_gains(problem.estimator, step)
+    gains = left_out_gains(problem.estimator, step, refits=problem.on_bench)
     nulls = largest_gains(problem.estimator, problem.catalogue, step.model)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)
 
 
-def left_out_gains(estimator: Estimator, step: Step) -> Array:
-    """Return what a step gains on each fold when that is left out, shape (folds,)."""
+def left_out_gains(estimator: Estimator, step: Step, refits: bool = False) -> Array:
+    """Return what a step gains on each fold when that is left out, shape (folds,).
+
+    With ``refits`` the others are fitted anew, where they take milliseconds; without, by one Newton step.
+    """
     new, folds = step.model, estimator.blocks.folds
-    gained = np.bincount(folds, costs(step.base.errors) - costs(new.errors))
+    before, after = (np.bincount(folds, costs(model.errors)) for model in (step.base, new))
+    gained, one = before - after, int(np.argmax(before - after))
     # What one recording alone shows cannot be left out. Wholly explained it counts: an imitation leaves something.
-    alone = gained.max() > ONE_FOLD * step.gain and step.energy_after < NEGLIGIBLE * step.energy_before
-    if alone or len(np.unique(folds)) < 2:
+    explained = step.energy_after < NEGLIGIBLE * step.energy_before
+    if refits:  # others may hold what comes later
+        explained |= bool(after[one] < NEGLIGIBLE * before[one])
+    if (gained[one] > ONE_FOLD * step.gain and explained) or len(np.unique(folds)) < 2:
         return np.array([step.gain])
     if not BY_ID[step.effect].differentiable:  # no Newton step tells what it would be without a recording
         others = gained.sum() - gained
         return np.where(others > NEGLIGIBLE * gained.sum(), gained, np.minimum(gained, 0.0))
-    return _predicted_gains(estimator, step.base, new)
+    if not refits:
+        return _predicted_gains(
+            _left_out_costs(estimator, step.base), _left_out_costs(estimator, new), step, folds
+        )
+    base, whole = (_refitted_costs(estimator, model, step.effect) for model in (step.base, new))
+    # A fold without which the base is not known says nothing of what is built on it.
+    return np.where(base > APART * before + PRICE, 0.0, _predicted_gains(base, whole, step, folds))
 
 
-def _predicted_gains(estimator: Estimator, base: Model, new: Model) -> Array:
+def _predicted_gains(before: Array, after: Array, step: Step, folds: npt.NDArray[np.int32]) -> Array:
     """Return what a model gains on each fold under parameters fitted to the others, shape (folds,).
 
-    The model below is asked to predict, too: what it fitted to the left-out recording would flatter it. But leaving
-    out may cost it no more than it costs the new one; else a base that falls apart would let everything pass.
+    ``before`` and ``after`` are what folds cost then. The model below is asked to predict, too: what it fitted to the
+    left-out recording would flatter it. But leaving out may cost it no more than it costs the new one; else a base that
+    falls apart would let everything pass.
     """
-    folds = estimator.blocks.folds
-    before, after = _left_out_costs(estimator, base), _left_out_costs(estimator, new)
-    lost = np.maximum(after - np.bincount(folds, costs(new.errors)), 0.0)
-    out: Array = np.minimum(before, np.bincount(folds, costs(base.errors)) + lost) - after
+    lost = np.maximum(after - np.bincount(folds, costs(step.model.errors)), 0.0)
+    out: Array = np.minimum(before, np.bincount(folds, costs(step.base.errors)) + lost) - after
     return out
 
 
@@ -67,3 +86,34 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
         estimator.blocks.folds,
         NEGLIGIBLE,
     )
+
+
+def _refitted_costs(estimator: Estimator, model: Model, effect: str) -> Array:
+    """Return each fold's cost under parameters fitted to the others from where they are, shape (folds,)."""
+    folds, residual = estimator.blocks.folds, estimator.residual(model.parameters)
+    known, (low, high) = _known_without(estimator, model, effect), model.parameters.bounds
+    probes = model.parameters.probes
+    out = np.zeros(len(known))
+    for k in np.unique(folds):
+        bounds = np.where(known[k], low, 0.0), np.where(known[k], high, 0.0)
+        others = _only(residual, folds != k)
+        found = least_squares(others, model.z, bounds, probes, REFITS, past_jumps=True)
+        out[k] = np.sum(costs(residual(found.z)[folds == k]))
+    return out
+
+
+def _only(residual: Residual, kept: npt.NDArray[np.bool_]) -> Residual:
+    return lambda z: np.ascontiguousarray(residual(z)[..., kept])
+
+
+def _known_without(estimator: Estimator, model: Model, effect: str) -> npt.NDArray[np.bool_]:
+    """Return which coordinates are known without each fold, shape (folds, k): an effect's others stay neutral.
+
+    They are known if other folds' residuals change with them; what was taken before is.
+    """
+    names, folds = [c.effect.id for c in model.parameters.coordinates], estimator.blocks.folds
+    w, known = weights(model.errors), np.ones((int(folds.max()) + 1, len(names)), bool)
+    for k in (k for k, name in enumerate(names) if name == effect):
+        told = np.bincount(folds, w * estimator.own_sensitivities(model)[:, k] ** 2)
+        known[:, k] = told.sum() - told > NEGLIGIBLE * told.sum()
+    return known

@@ -112,7 +112,8 @@ def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
     """Improve an effect's best start by two iterations."""
     residual = estimator.residual(trial.parameters)
     bounds, probes = trial.parameters.bounds, trial.parameters.probes
-    return replace(trial, minimum=least_squares(residual, trial.starts[0], bounds, probes, rounds=2))
+    begun = least_squares(residual, trial.starts[0], bounds, probes, rounds=2, past_jumps=estimator.on_bench)
+    return replace(trial, minimum=begun)
 
 
 def _fitted(estimator: Estimator, trial: _Trial, best: float) -> Model:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.materiality import Size
 from gecar.reality.selection.acceptance import (
+    at_a_bound,
     candidates,
     imitates_dry_friction,
     is_material,
@@ -21,6 +22,7 @@ from gecar.reality.selection.acceptance import (
     stopped,
 )
 from gecar.reality.selection.cross_validation import judged
+from gecar.reality.selection.motor_constants import CONSTANTS, with_constants
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
 from gecar.reality.selection.thresholds import (
@@ -83,16 +85,40 @@ def explain(problem: Problem) -> Explanation:
     """
     known = problem.under(problem.known)
     first = candidate_steps(known, known.known)
+    if problem.on_bench:
+        return _explain_motor(known, first)
     with_clocks = _with_clocks(known, known.known, first)
     if with_clocks is not None:
         return explain(with_clocks)
-    chain = _forward(known, first)
+    chain = _forward(known, _Chain((), known.known, ()), first)
     if chain.with_clocks is not None:
         return explain(chain.with_clocks)
     best = _best_chain(problem, [chain, *_other_beginnings(known, first, chain)])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     return concluded(problem, model, steps, tried)
+
+
+def _explain_motor(problem: Problem, first: Sequence[Step]) -> Explanation:
+    """Explain a motor on a bench: its own constants before anything else, chosen anew beside what is found."""
+    model = with_constants(problem, problem.known)
+    begun = _Chain(_steps(problem, model), model, (tuple(first),))
+    chain = _forward(problem, begun, candidate_steps(problem, model))
+    model = with_constants(problem, chain.model)
+    constants = [effect for effect in model.effects if effect in CONSTANTS]
+    found = replace(chain, steps=tuple(s for s in chain.steps if s.effect not in CONSTANTS), model=model)
+    model, kept = _swapped_and_dropped(problem, found, chain.tried, constants)
+    model = with_constants(problem, model)
+    stages = {step.effect: step.stage for step in kept}
+    steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, model)]
+    return concluded(problem, model, steps, chain.tried)
+
+
+def _steps(problem: Problem, model: Model) -> tuple[Step, ...]:
+    """Return the step of every effect of a model on top of all others."""
+    return tuple(
+        _judged(problem, model, [e for e in model.effects if e != effect], effect) for effect in model.effects
+    )
 
 
 def concluded(
@@ -145,9 +171,9 @@ class _Chain:
     with_clocks: Problem | None = None
 
 
-def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
-    """Go on from a first stage until nothing more proves itself; the problem is under what the known robot leaves."""
-    model, steps, tried = problem.known, list[Step](), list[tuple[Step, ...]]()
+def _forward(problem: Problem, begun: _Chain, first: Sequence[Step]) -> _Chain:
+    """Continue a chain until nothing more proves itself; the problem is under what its model leaves."""
+    model, steps, tried = begun.model, list(begun.steps), list(begun.tried)
     here, stage = problem, tuple(first)
     most = int(MOST_ON_BENCH if problem.on_bench else MOST_EFFECTS)
     while True:
@@ -156,12 +182,12 @@ def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
         if step is None:
             break
         problem.tell(f"{step.effect}: gains {step.gain:.0f}")
-        steps.append(replace(step, stage=len(steps)))
+        steps.append(replace(step, stage=len(tried) - 1))
         if len(steps) == most:
             model = step.model
             break
         here = problem.under(step.model)
-        model = here.estimator.fit(step.model.effects, step.model.values)
+        model = _refitted(here, step.model)
         stage = tuple(candidate_steps(here, model))
         with_clocks = _with_clocks(here, model, stage)
         if with_clocks is not None:
@@ -169,9 +195,26 @@ def _forward(problem: Problem, first: Sequence[Step]) -> _Chain:
     return _Chain(tuple(steps), model, tuple(tried))
 
 
+def _refitted(problem: Problem, model: Model) -> Model:
+    """Fit a model once more; on a bench with other constants if one is at a bound, and past jumps by a search."""
+    model = problem.estimator.fit(model.effects, model.values)
+    if problem.on_bench and at_a_bound(model):
+        model = with_constants(problem, model)
+    if not (problem.on_bench and any(BY_ID[effect].search for effect in model.effects)):
+        return model
+    found = problem.estimator.searched(model, 1.0)
+    return min(found, problem.estimator.fit(found.effects, found.values), key=lambda m: m.cost)
+
+
 def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
-    """Return the best candidate that gains on left-out recordings; None if there is none."""
-    return next(filter(proved, (judged(problem, step) for step in candidates(problem, stage))), None)
+    """Return the best candidate that gains on left-out recordings; None if there is none.
+
+    On a bench, where many fit alike, the one that gains most on them.
+    """
+    found = filter(proved, (judged(problem, step) for step in candidates(problem, stage)))
+    if problem.on_bench:
+        return max(found, key=lambda step: float(step.left_out.sum()), default=None)
+    return next(found, None)
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
@@ -179,7 +222,7 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
     if len(chain.steps) < 2:
         return []
     rivals = [s for s in first[1:BEGINNINGS] if s.gain > COMPETING * first[0].gain and not stopped(s)]
-    chains = [_forward(problem, [step]) for step in rivals]
+    chains = [_forward(problem, _Chain((), problem.known, ()), [step]) for step in rivals]
     return [other for other in chains if other.with_clocks is None]
 
 
@@ -195,21 +238,25 @@ def _best_chain(problem: Problem, chains: Sequence[_Chain]) -> _Chain:
 
 
 def _swapped_and_dropped(
-    problem: Problem, chain: _Chain, tried: Sequence[Sequence[Step]]
+    problem: Problem, chain: _Chain, tried: Sequence[Sequence[Step]], settled: Sequence[str] = ()
 ) -> tuple[Model, tuple[Step, ...]]:
-    """Judge every effect of a chain beside all others, under what they leave together.
+    """Judge every effect of a chain beside all others, and those that are settled, under what they leave together.
 
     An effect taken early may have stood in for a cause that only the later ones let come forward: each is swapped
     against its runners-up, and dropped where the others can do without it.
     """
     steps, model = dict(enumerate(chain.steps)), chain.model
     rivals = {step.effect: step for stage in tried for step in stage[:RIVALS]}
-    several = chain.steps if len(chain.steps) > 1 else ()  # one alone was judged beside nothing else
+    if settled:
+        rivals = {effect: step for effect, step in rivals.items() if effect not in CONSTANTS}
+    several = (
+        chain.steps if settled or len(chain.steps) > 1 else ()
+    )  # one alone was judged beside nothing else
     for number, step in enumerate(several):
-        rest = [s.effect for s in steps.values() if s is not step]
+        rest = [*settled, *(s.effect for s in steps.values() if s is not step)]
         here = problem.under(model, rest)
-        found = _judged(here, model, rest, step)
-        swap = _swapped(here, found, rest, list(rivals.values()))
+        found = _judged(here, model, rest, step.effect)
+        swap = _swapped(here, found, rest, list(rivals.values())) if rest else None
         if swap is not None:
             steps[number], model = replace(swap, stage=step.stage), swap.model
         elif found.gain < PRICE or not proved(found):
@@ -219,18 +266,18 @@ def _swapped_and_dropped(
             steps[number], model = replace(found, stage=step.stage), found.model
     kept = tuple(steps.values())
     estimator = problem.under(model).estimator
-    model = estimator.fit([step.effect for step in kept], model.values)
+    model = estimator.fit([*settled, *(step.effect for step in kept)], model.values)
     if any(BY_ID[effect].search for effect in model.effects):
         model = estimator.searched(model)
     return model, kept
 
 
-def _judged(problem: Problem, model: Model, rest: Sequence[str], step: Step) -> Step:
+def _judged(problem: Problem, model: Model, rest: Sequence[str], effect: str) -> Step:
     """Return an effect's step on top of all others."""
     estimator = problem.estimator
     base = estimator.fit(rest, model.values)
-    whole = estimator.fit((*rest, step.effect), model.values)
-    return judged(problem, step_of(estimator, step.effect, base, whole))
+    whole = estimator.fit((*rest, effect), model.values)
+    return judged(problem, step_of(estimator, effect, base, whole))
 
 
 def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequence[Step]) -> Step | None:
@@ -243,7 +290,11 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
         swapped = estimator.fit((*rest, other.effect), values)
         if swapped.cost < found.model.cost - found.null_95:
             step = judged(problem, step_of(estimator, other.effect, found.base, swapped))
-            if proved(step) and not stopped(step) and not imitates_dry_friction(problem, swapped):
+            if (
+                proved(step)
+                and not stopped(step, own=problem.on_bench)
+                and not imitates_dry_friction(problem, swapped)
+            ):
                 return step
     return None
 

@@ -32,6 +32,12 @@ ONE_FOLD = Threshold(
     0.9, "share of a step's gain in one recording above which leaving it out is no test", "hand"
 )
 
+APART = Threshold(
+    4.0,
+    "times a recording's cost to which leaving it out raises that of a model that is not known then",
+    "hand",
+)
+
 # -- Forward selection
 MOST_EFFECTS = Threshold(4, "most effects of a robot on the floor", "hand")
 MOST_ON_BENCH = Threshold(
