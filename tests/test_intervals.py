@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from gecar.reality import discovery
 from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.of_case import motion_residuals
@@ -20,6 +21,7 @@ from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, intervals
+from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID
 
 VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
@@ -67,6 +69,17 @@ def test_an_interval_that_contains_neutral_is_told() -> None:
         problem = linear_problem(linear({VISCOUS: size}, {VISCOUS: bumps(1, 4, 1.0)}))
         model = fitted(problem, VISCOUS)
         assert contains_neutral(model, VISCOUS, intervals(problem.estimator, model)) is contained
+
+
+@pytest.mark.parametrize(("low", "absent"), [(0.06, False), (0.04, True)])
+def test_a_place_whose_radius_is_not_known_to_a_factor_of_two_is_none(low: float, absent: bool) -> None:
+    values = {"slippery_patch": {"radius_m": 0.08, "x_m": 1.0, "y_m": 0.5, "coefficient": 0.1}}
+    model = SimpleNamespace(parameters=free(EV3, ["slippery_patch"]))
+    spans = {
+        "slippery_patch": {label: Interval(v, v, v, "m") for label, v in values["slippery_patch"].items()}
+    }
+    spans["slippery_patch"]["radius_m"] = Interval(0.08, low, 0.1, "m")
+    assert contains_neutral(model, "slippery_patch", spans) is absent  # type: ignore[arg-type]
 
 
 def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(

@@ -149,6 +149,11 @@ class Effect:
         """Whether it changes what the colour sensor reads, and nothing else."""
         return self.channels == ("sensor",)
 
+    @property
+    def at_a_place(self) -> bool:
+        """Whether it acts at a place on the floor, which a recording may not pass."""
+        return self.scan == "floor cells"
+
 
 _P = Parameter
 

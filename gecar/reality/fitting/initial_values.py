@@ -74,7 +74,7 @@ def responses(
         yield from (-basis for _, _, basis in _ripples(robot, recordings, errors, _unrippled(errors)))
         return
     values: Sequence[Values] = ()
-    if effect.scan == "floor cells":
+    if effect.at_a_place:
         larger = [r for r in PATCH_RADII_M if r > SCANNED_RADIUS_M]
         values = [_patch(*cell, radius, SCANNED_GRIPS[0]) for cell in _cells(recordings) for radius in larger]
         values += [_patch(*cell, SCANNED_RADIUS_M, SCANNED_GRIPS[1]) for cell in _cells(recordings, reach=1)]

@@ -16,6 +16,7 @@ from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import Explanation, concluded
 from gecar.reality.selection.thresholds import MAIN_SHARE
+from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
@@ -40,8 +41,9 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
-    it was fitted, predicts worse than none (`share_asked_for`). An effect that none of them shows stays. Whole drives
-    must not come out worse with the effect; where much is left that nothing explains, they must come out better.
+    it was fitted, predicts worse than none (`share_asked_for`). A place on the floor that none of them passes stays.
+    Whole drives must not come out worse with the effect; where much is left that nothing explains, they must come out
+    better.
 
     Parameters
     ----------
@@ -55,7 +57,7 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
         with_all = _held_errors(explained, held, explained.taken, explained.taken)
         judged = [_judged(explained, held, step, with_all) for step in explained.steps]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        shown = [(step, share) for step, share in judged if share is not UNSEEN]
+        shown = [(s, share) for s, share in judged if not (share is UNSEEN and BY_ID[s.effect].at_a_place)]
         failing = [pair for pair in shown if pair[1].margin <= 0.0]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)

@@ -16,10 +16,12 @@ from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
+from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.96
+KNOWN = 2.0  # times its lower end, the upper end of a radius that is known
 FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
 FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
 
@@ -65,13 +67,16 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
     """Whether the interval of an effect's size holds its neutral value.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
-    what they gain together decides.
+    what they gain together decides. A place on the floor has edges: one whose radius is not known to a factor of
+    `KNOWN` may as well be something else.
     """
     sizes = [
         (spans[effect][c.parameter.label], c.value(0.0))
         for c in model.parameters.coordinates
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
+    if BY_ID[effect].at_a_place:
+        return any(interval.high > KNOWN * interval.low for interval, _ in sizes)
     return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
 
 

@@ -70,7 +70,7 @@ def _limit(problem: Problem, model: Model, effect: str) -> Limit | None:
 def _shapes(problem: Problem, model: Model, parameters: Parameters, effect: str) -> list[Array]:
     """Return a model's coordinates with an effect's shape: as searches begin, or at several places on the floor."""
     tried: Sequence[Mapping[str, float]] = ()
-    if BY_ID[effect].scan == "floor cells":
+    if BY_ID[effect].at_a_place:
         tried = patches(problem.recordings, MOST_PLACES)
     elif any(p.worthwhile == 0.0 for p in BY_ID[effect].parameters[1:]):
         trial = problem.estimator.trial(model, effect)
