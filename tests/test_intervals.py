@@ -71,15 +71,14 @@ def test_an_interval_that_contains_neutral_is_told() -> None:
         assert contains_neutral(model, VISCOUS, intervals(problem.estimator, model)) is contained
 
 
-@pytest.mark.parametrize(("low", "absent"), [(0.06, False), (0.04, True)])
-def test_a_place_whose_radius_is_not_known_to_a_factor_of_two_is_none(low: float, absent: bool) -> None:
-    values = {"slippery_patch": {"radius_m": 0.08, "x_m": 1.0, "y_m": 0.5, "coefficient": 0.1}}
+@pytest.mark.parametrize(
+    ("low", "grip", "named"), [(0.06, 0.8, True), (0.04, 0.8, False), (0.04, 0.4, True), (0.0, 0.5, False)]
+)
+def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: float, named: bool) -> None:
     model = SimpleNamespace(parameters=free(EV3, ["slippery_patch"]))
-    spans = {
-        "slippery_patch": {label: Interval(v, v, v, "m") for label, v in values["slippery_patch"].items()}
-    }
-    spans["slippery_patch"]["radius_m"] = Interval(0.08, low, 0.1, "m")
-    assert contains_neutral(model, "slippery_patch", spans) is absent  # type: ignore[arg-type]
+    spans = {label: Interval(1.0, 0.9, 1.1, "m") for label in ("x_m", "y_m")}
+    spans |= {"radius_m": Interval(0.08, low, 0.1, "m"), "coefficient": Interval(0.1, 0.1, grip, "-")}
+    assert contains_neutral(model, "slippery_patch", {"slippery_patch": spans}) is not named  # type: ignore[arg-type]
 
 
 def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(

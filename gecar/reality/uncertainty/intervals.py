@@ -67,8 +67,7 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
     """Whether the interval of an effect's size holds its neutral value.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
-    what they gain together decides. A place on the floor has edges: one whose radius is not known to a factor of
-    `KNOWN` may as well be something else.
+    what they gain together decides.
     """
     sizes = [
         (spans[effect][c.parameter.label], c.value(0.0))
@@ -76,8 +75,19 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
     if BY_ID[effect].at_a_place:
-        return any(interval.high > KNOWN * interval.low for interval, _ in sizes)
+        return not _is_place(model, spans[effect])
     return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
+
+
+def _is_place(model: Model, spans: Mapping[str, Interval]) -> bool:
+    """Whether a patch has edges, or surely grips less than half as much as elsewhere.
+
+    One that grips little less, within a radius that may as well be twice as large, is as likely something else: tyres
+    that got dusty.
+    """
+    radius, grip = spans["radius_m"], spans["coefficient"]
+    elsewhere = float(model.parameters.robot.physics["tyre_friction"][0])
+    return radius.high < KNOWN * radius.low or grip.high < 0.5 * elsewhere
 
 
 def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
