@@ -27,6 +27,7 @@ def test_what_a_search_over_places_cycles_and_limits_finds_in_noise_is_no_surpri
 ) -> None:
     monkeypatch.setattr("gecar.reality.selection.screening.PRICE", -1.0)  # fit it whatever it promises
     monkeypatch.setattr("gecar.reality.selection.screening.NEGLIGIBLE", -1.0)
+    monkeypatch.setattr("gecar.reality.fitting.initial_values.LEAST_GAIN", -1.0)
     p = []
     for seed in range(4):
         problem = of_noise(effect, seed)

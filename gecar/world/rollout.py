@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -176,7 +177,7 @@ class Drive:
     steps
         Steps simulated.
     energy_j
-        Electrical energy that the motors took from the battery [J].
+        Electrical energy that the motors took from the battery [J]; nan: not known.
     trace
         Time series at 100 Hz by name (`TRACE_COLUMNS`; angles in rad, duties -1..1), or None.
     obstacles
@@ -188,7 +189,7 @@ class Drive:
     checkpoints: int
     arrival_s: npt.NDArray[np.float64]
     steps: int
-    energy_j: float
+    energy_j: float = math.nan
     trace: Mapping[str, npt.NDArray[np.float64]] | None = None
     obstacles: npt.NDArray[np.float64] | None = None
 

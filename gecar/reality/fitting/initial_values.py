@@ -210,7 +210,9 @@ def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Va
     lowers residuals most (a matched filter: Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4).
     """
     tried = _scanned(recordings)
-    bare = errors([{}])[0]
+    if not tried:
+        return
+    bare = errors([{**tried[0], "radius_m": 0.0}])[0]
     gains = np.array([_gain_of_multiple(bare, each - bare) for each in residuals_of_each(errors, tried)])
     kept = (k for k in np.argsort(-gains, kind="stable") if gains[k] > LEAST_GAIN)
     best = list(dict.fromkeys((tried[k]["x_m"], tried[k]["y_m"]) for k in kept))
