@@ -9,9 +9,11 @@ import tempfile
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_type_hints
 
 from gecar.errors import InputError, expected
+
+R = TypeVar("R", bound=tuple[Any, ...])
 
 
 def shipped(folder: str) -> Path:
@@ -112,6 +114,30 @@ def read_text(path: Path, what: str) -> str:
         raise expected(path, error.strerror or "an unreadable file", what) from None
     except ValueError:  # a null in its name
         raise expected(path, "a name that no file can have", what) from None
+
+
+def read_rows(path: Path, what: str, kind: type[R]) -> list[R]:
+    """Read a table whose columns are the fields of a named tuple of numbers and text without commas.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, has other columns, or a row has other values; names the line.
+    """
+    kinds = get_type_hints(kind)
+    head, *rows = read_text(path, what).splitlines() or [""]
+    if head != ",".join(kinds):
+        raise expected(path, repr(head[:60]), f"the columns {', '.join(kinds)}")
+    wanted = f"{len(kinds)} {'values' if str in kinds.values() else 'numbers'}"
+    found = []
+    for number, row in enumerate(rows, 2):
+        try:
+            found.append(
+                kind(*(each(word) for each, word in zip(kinds.values(), row.split(","), strict=True)))
+            )
+        except ValueError:
+            raise expected(f"{path}, line {number}", repr(row[:60]), wanted) from None
+    return found
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -281,7 +281,7 @@ def test_an_effect_after_which_whole_drives_come_out_worse_is_no_candidate() -> 
     (right, *_) = explain(problem).steps
     wrong = replace(right, model=problem.estimator.at(right.model, np.array([9.0])))
     assert candidates(problem, [right]) == [right]
-    assert worsens(problem, wrong)
+    assert worsens(problem, wrong.base, wrong.model)
     assert candidates(problem, [wrong]) == []
 
 

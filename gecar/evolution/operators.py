@@ -103,6 +103,12 @@ class Operators:
         mutation = mutation or Flip(rate, within_used=settings.mutation != "codon")
         return cls(initialise, select, (crossover, mutation, *duplicate, *creep), grow, replace)
 
+    @property
+    def archive(self) -> MapElites | None:
+        """MAP-Elites, where it chooses who lives on."""
+        algorithm = _algorithm(self.replace)
+        return algorithm if isinstance(algorithm, MapElites) else None
+
     def check(self, mapper: Mapper, n_cases: int) -> None:
         """Check that the operators suit a mapper and scores.
 
@@ -112,7 +118,7 @@ class Operators:
             If one needs cases and there are none, or codons read from the first on and the mapper has genes.
         """
         for chooser in (self.select, self.replace):
-            algorithm = getattr(chooser, "__self__", chooser)  # of a method, the object it belongs to
+            algorithm = _algorithm(chooser)
             if getattr(algorithm, "needs_cases", False) and n_cases == 0:
                 found = f"{type(algorithm).__name__.lower()} without cases"
                 raise expected("selection", found, "scores with cases, or tournament")
@@ -123,6 +129,11 @@ class Operators:
             if getattr(operator, "linear", False) and not mapper.linear:
                 found = f"{type(operator).__name__} for a {type(mapper).__name__}"
                 raise expected("operators", found, "operators on genes, such as GeneCrossover and GeneFlip")
+
+
+def _algorithm(operator: Any) -> Any:
+    """Return what an operator belongs to, if it is a method, or else the operator."""
+    return getattr(operator, "__self__", operator)
 
 
 def change_of(operator: Variation) -> np.uint8:

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.errors import InputError, expected
+from gecar.errors import expected
 from gecar.evolution.ask_tell import Evolution
-from gecar.evolution.goals import MapElites, fronts
+from gecar.evolution.goals import fronts
 from gecar.evolution.phenotypes import Phenotypes
-from gecar.files import read_text
+from gecar.files import read_rows
 from gecar.language.program import Program, read_program
 from gecar.results.folder import FRONT_FILE, FRONT_FOLDER, RunFolder
 from gecar.search.chance import REPORT, REPORTED_DRAWS, Arrivals, arrivals
@@ -91,8 +91,8 @@ def measure_front(
     values = np.column_stack([measured[GOALS[name].field] for name in search.goals])
     if search.draws > 1:
         values[1.0 - measured["missed"] < search.required_share] = np.inf
-    archive = getattr(evolution.operators.replace, "__self__", None)
-    if isinstance(archive, MapElites):
+    archive = evolution.operators.archive
+    if archive is not None:
         kept = archive.best(values)
     kept = kept[np.lexsort(values[kept].T[::-1])]
     whole = np.flatnonzero(np.isfinite(values[kept]).all(axis=1))
@@ -149,23 +149,10 @@ def read_front(folder: Path) -> list[Point]:
     InputError
         If it is missing, or a row is not as `Point`.
     """
-    path = folder / FRONT_FILE
-    rows = read_text(path, "the front of a run with several goals").splitlines()
-    wanted = ",".join(Point._fields)
-    if not rows or rows[0] != wanted:
-        raise expected(path, rows[0][:60] if rows else "nothing", wanted)
-    return [_point(row, f"{path}, line {k}") for k, row in enumerate(rows[1:], 2)]
+    return read_rows(folder / FRONT_FILE, "the front of a run with several goals", Point)
 
 
 def load_front(folder: Path) -> Front:
     """Read a run's front.csv, and its programs."""
     points = read_front(folder)
     return Front(points, [read_program(folder / FRONT_FOLDER / f"{point.program}.txt") for point in points])
-
-
-def _point(row: str, where: str) -> Point:
-    try:
-        program, on_front, time_s, missed, energy_j, length = map(float, row.split(","))
-        return Point(int(program), int(on_front), time_s, missed, energy_j, int(length))
-    except (ValueError, OverflowError):
-        raise InputError(f"{where}: found {row[:60]!r}, expected {len(Point._fields)} numbers") from None

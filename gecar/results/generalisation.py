@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gecar.errors import expected
-from gecar.files import read_text
+from gecar.files import read_rows
 from gecar.language.program import Program
 from gecar.parallel.executors import usable_cores
 from gecar.results.arrival import percent
@@ -155,19 +155,12 @@ def read_drives(path: Path) -> list[CourseDrive]:
     InputError
         If the file is missing or is no such table; names the line.
     """
-    head, *rows = read_text(path, "a table of drives on several courses").splitlines() or [""]
-    if head != ",".join(CourseDrive._fields) or not rows:
-        raise expected(path, repr(head[:60]), f"the columns {', '.join(CourseDrive._fields)}, and rows")
-    return [_read(row, f"{path}, line {number}") for number, row in enumerate(rows, 2)]
-
-
-def _read(row: str, where: str) -> CourseDrive:
-    words = row.split(",")
-    kinds = (str, int, float, int, int, float, int)
-    try:
-        drive = CourseDrive(*(kind(word) for kind, word in zip(kinds, words, strict=True)))
-    except ValueError:
-        raise expected(where, repr(row[:60]), f"{len(kinds)} values") from None
-    if not (math.isfinite(drive.time_s) and 0 <= drive.checkpoints <= drive.of):
-        raise expected(where, repr(row[:60]), "a time, and checkpoints within their number")
-    return drive
+    drives = read_rows(path, "a table of drives on several courses", CourseDrive)
+    if not drives:
+        raise expected(path, "no row", "one for each course")
+    for number, drive in enumerate(drives, 2):
+        if not (math.isfinite(drive.time_s) and 0 <= drive.checkpoints <= drive.of):
+            raise expected(
+                f"{path}, line {number}", repr(drive), "a time, and checkpoints within their number"
+            )
+    return drives

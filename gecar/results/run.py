@@ -249,9 +249,8 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
             search(task, evolution, saved)
         saver.save()
         choose(task, evolution)
-        folder.save(
-            evolution.state(), task.configuration
-        )  # who came from whom is asked of the program chosen
+        # Who came from whom is asked of the program chosen.
+        folder.save(evolution.state(), task.configuration)
         folder.write_reports(evolution)
         more = (
             measured(task, evolution)

@@ -12,7 +12,6 @@ import numpy as np
 from gecar.cli.inputs import build_world, drive_seed, find_program, read_run_config
 from gecar.cli.output import Output
 from gecar.errors import expected
-from gecar.evolution.goals import MapElites
 from gecar.evolution.lineage import Member
 from gecar.language.program import Program, read_program
 from gecar.plots.courses.many import courses_figure
@@ -85,8 +84,8 @@ def draw_front(folder: Path, target: Path) -> Path:
     labels, best = [goal.label for goal in goals], [point.on_front == 1 for point in points]
     spent = read_result(folder)["evaluations"]
     detail = f"preset {config.preset}, seed {config.seed} · {spent:,} evaluations"
-    archive = getattr(load_task(config).operators.replace, "__self__", None)
-    if isinstance(archive, MapElites) and len(goals) == 3:
+    archive = load_task(config).operators.archive
+    if archive is not None and len(goals) == 3:
         title = f"The best program in each of {len(points)} cells"
         ends = [
             (low * goal.scale, high * goal.scale)

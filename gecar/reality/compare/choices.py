@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -88,23 +89,35 @@ def choices(verdict: Verdict) -> tuple[Choice, ...]:
         if not taken and explained.unexplained:
             taken = [(None, explained.tried[0])]
         for step, tried in taken:
-            told = [_choice(explained.problem, evidence.held, each, step, tried) for each in measures]
+            base, models = _candidates(explained.problem, step, tried)
+            told = [_choice(explained.problem, evidence.held, each, step, base, models) for each in measures]
             choice = max(told, key=lambda each: each.lead)  # the first of those that tell as much
             if choice.rivals:
                 out.append(choice)
     return tuple(out)
 
 
-def _choice(
-    problem: Problem, held: Residuals, measure: str, step: Step | None, tried: tuple[Step, ...]
-) -> Choice:
-    """Return what an effect and its runners-up leave on top of what had been taken before."""
+def _candidates(
+    problem: Problem, step: Step | None, tried: tuple[Step, ...]
+) -> tuple[Model, dict[str, Model]]:
+    """Return what had been taken before an effect, and it and its runners-up fitted on top of that, by effect."""
     first = step or (tried[0] if tried else None)
     base = first.base if first else problem.known
     models = {other.effect: other.model for other in tried if set(base.effects) == set(other.base.effects)}
     models |= {step.effect: step.model} if step else {}
     missing = [e for e in problem.catalogue if e not in models and e not in base.effects]
-    models |= _fitted(problem, base, missing, MOST_RIVALS - len(models))
+    return base, models | _fitted(problem, base, missing, MOST_RIVALS - len(models))
+
+
+def _choice(
+    problem: Problem,
+    held: Residuals,
+    measure: str,
+    step: Step | None,
+    base: Model,
+    models: Mapping[str, Model],
+) -> Choice:
+    """Return what an effect and its runners-up leave by a measure."""
     before = _left(held, base, measure)
     rivals = [
         Rival(effect, _left(held, model, measure), step is not None and effect == step.effect)

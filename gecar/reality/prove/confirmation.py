@@ -55,14 +55,15 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     candidates = list[Step]()
     while explained.steps and held.recordings:
         with_all = _held_errors(explained, held, explained.taken, explained.taken)
-        judged = [_judged(explained, held, step, with_all) for step in explained.steps]
+        without = {s.effect: _without(explained.problem, explained.taken, s) for s in explained.steps}
+        judged = [_judged(explained, held, step, without[step.effect], with_all) for step in explained.steps]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
         shown = [(s, share) for s, share in judged if not (share is UNSEEN and BY_ID[s.effect].at_a_place)]
         failing = [pair for pair in shown if pair[1].margin <= 0.0]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)
         else:
-            useless = [step for step, _ in shown if not _helps(explained, held, step)]
+            useless = [step for step, _ in shown if not _helps(explained, held, without[step.effect])]
             if not useless:
                 break
             worst = useless[0]
@@ -71,27 +72,27 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     return Confirmation(explained, tuple(candidates))
 
 
-def _judged(explained: Explanation, held: Residuals, step: Step, with_all: Array) -> tuple[Step, Share]:
+def _judged(
+    explained: Explanation, held: Residuals, step: Step, without: Model, with_all: Array
+) -> tuple[Step, Share]:
     """Return a step with what it gains on recordings set aside, and the share of it they ask for.
 
     Without the effect, all other constants may differ a little as with it, or as they would without it: in the first
     case what they make up for would speak for the effect, in the second what they make up would. The less counts.
-    ``with_all`` are the residuals under all steps, shape (n,).
+    ``without`` is the model without it; ``with_all`` are the residuals under all steps, shape (n,).
     """
-    model = _without(explained.problem, explained.taken, step)
-    without = [_held_errors(explained, held, model, beside) for beside in (explained.taken, model)]
-    gain = cost(without[0]) - cost(with_all)
-    shares = [share_asked_for(held.index, errors, with_all) for errors in without]
+    left = [_held_errors(explained, held, without, beside) for beside in (explained.taken, without)]
+    gain = cost(left[0]) - cost(with_all)
+    shares = [share_asked_for(held.index, errors, with_all) for errors in left]
     unseen = shares[0] is UNSEEN
     return replace(step, holdout_gain=gain), UNSEEN if unseen else min(shares, key=lambda share: share.margin)
 
 
-def _helps(explained: Explanation, held: Residuals, step: Step) -> bool:
+def _helps(explained: Explanation, held: Residuals, without: Model) -> bool:
     """Whether whole drives set aside come out no worse with an effect; or much better, where much is unexplained."""
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    without = _without(problem, explained.taken, step)
     if not explained.unexplained:
-        return not worsens(problem, replace(step, base=without, model=explained.taken), sizes)
+        return not worsens(problem, without, explained.taken, sizes)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     now, before = (problem.material.times(sizes.left(physics)) for physics in beside)
     return now**2 < (1.0 - MAIN_SHARE) * before**2

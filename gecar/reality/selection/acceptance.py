@@ -51,8 +51,8 @@ def is_worthwhile(model: Model, effect: str) -> bool:
     return worthwhile(model.parameters, model.z, effect)
 
 
-def worsens(problem: Problem, step: Step, sizes: Sizes | None = None) -> bool:
-    """Whether whole drives come out worse with a step's effect than without, where that is material.
+def worsens(problem: Problem, without: Model, with_effect: Model, sizes: Sizes | None = None) -> bool:
+    """Whether whole drives come out worse with an effect than without, where that is material.
 
     They do where an effect needs small changes of other constants to make up for it, which no robot file has. Of two
     causes that make up for each other, the first shows as much afterwards as before, in other channels.
@@ -61,13 +61,13 @@ def worsens(problem: Problem, step: Step, sizes: Sizes | None = None) -> bool:
     ----------
     problem
         What is material.
-    step
-        Models without the effect and with it.
+    without, with_effect
+        The models.
     sizes
         Under the commands of which recordings; default: those fitted on.
     """
     left = (sizes or problem.sizes).left
-    before, now = (problem.material.times(left(model.physics)) for model in (step.base, step.model))
+    before, now = (problem.material.times(left(model.physics)) for model in (without, with_effect))
     return now > max(WORSE * before, 1.0)
 
 
@@ -83,7 +83,7 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     enough = [step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best)]
     if problem.on_bench:
         return [step for step in enough if not stopped(step, own=True)]
-    return [step for step in enough if not (stopped(step) or worsens(problem, step))]
+    return [step for step in enough if not (stopped(step) or worsens(problem, step.base, step.model))]
 
 
 def imitates_dry_friction(problem: Problem, model: Model) -> bool:

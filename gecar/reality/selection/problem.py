@@ -76,7 +76,7 @@ class Problem:
     @property
     def on_bench(self) -> bool:
         """Whether all recordings were made on a bench."""
-        return all(r.setup.rig == "bench" for r in self.recordings)
+        return self.estimator.on_bench
 
     def under(self, model: Model, free_effects: Sequence[str] | None = None) -> Problem:
         """Return the problem with the discrepancy that a model leaves; effects that are free (its own) are no part.

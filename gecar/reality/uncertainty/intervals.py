@@ -69,13 +69,13 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
     what they gain together decides.
     """
+    if BY_ID[effect].at_a_place:
+        return not _is_place(model, spans[effect])
     sizes = [
         (spans[effect][c.parameter.label], c.value(0.0))
         for c in model.parameters.coordinates
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
-    if BY_ID[effect].at_a_place:
-        return not _is_place(model, spans[effect])
     return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
 
 

@@ -32,10 +32,8 @@ Array = npt.NDArray[np.float64]
 SIZES = np.geomspace(1.0, 60.0, 12)  # in sizes worth a name; more than any bound
 SURE = 1.645  # 95 % quantile of a normal distribution
 NEEDED = np.sqrt(2.0 * PRICE) + SURE
-MOST_PLACES, SEEN_PLACES = (
-    10,
-    0.9,
-)  # on the floor, where an effect has one; the share of them that must show it
+MOST_PLACES = 10  # on the floor, where an effect has one
+SEEN_PLACES = 0.9  # share of them that must show it
 MARGIN = 1.15  # on the size: what a limit is computed with is a little off, too
 
 
