@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
@@ -37,6 +37,11 @@ class LinearResiduals:
 
     def gyro_errors(self) -> np.ndarray:
         return np.zeros((len(self.noise), 3))
+
+    def part(self, numbers: Sequence[int]) -> LinearResiduals:
+        rows = np.isin(self.index.recording, numbers)
+        responses = {effect: response[rows] for effect, response in self.responses.items()}
+        return replace(self, responses=responses, noise=self.noise[rows], count=len(numbers))
 
     @property
     def clock_offsets_s(self) -> np.ndarray:

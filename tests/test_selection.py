@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
+from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import stepwise
@@ -267,6 +268,55 @@ def test_taking_an_effect_out_restores_the_known_robot_s_value() -> None:
     explained = explain(problem)
     proof = confirmed(explained, linear({VISCOUS: 0.0}, RESPONSES, seed=5))  # type: ignore[arg-type]
     assert proof.explained.taken.physics == EV3.physics
+
+
+BLIND = replace(linear({}, RESPONSES, seed=5), responses={e: np.zeros_like(r) for e, r in RESPONSES.items()})
+
+
+def shown_in(recordings: list[float]) -> LinearResiduals:
+    """Return recordings in which an effect of 3 sizes shows, each by a share."""
+    fitted = linear({VISCOUS: 3.0}, RESPONSES)
+    shares = np.repeat(np.array(recordings), len(fitted.noise) // len(recordings))
+    return replace(fitted, responses={**RESPONSES, VISCOUS: shares * RESPONSES[VISCOUS]})
+
+
+@pytest.mark.parametrize(
+    ("recordings", "kept"),
+    [([1.0, 1.0, 1.0, 1.0], True), ([1.0, 0.0, 1.0, 0.0], True), ([0.0, 0.0, 1.0, 0.0], False)],
+)
+def test_what_recordings_set_aside_do_not_show_is_confirmed_by_those_fitted_on(
+    recordings: list[float], kept: bool
+) -> None:
+    explained = explain(linear_problem(shown_in(recordings)))
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    proof = confirmed(explained, BLIND)  # type: ignore[arg-type]
+    assert proof.unseen == ((VISCOUS,) if kept else ())
+    assert [step.effect for step in proof.explained.steps] == [VISCOUS] * kept
+    assert [step.effect for step in proof.candidates] == [VISCOUS] * (not kept)
+    assert not kept or proof.explained.steps[0].holdout_gain > 100.0
+
+
+def test_an_imitation_that_recordings_set_aside_do_not_show_is_a_candidate() -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    other = replace(explained.problem.residuals, noise=set_aside([-1.5, 0.5, 1.5, 2.5]).noise)  # type: ignore[type-var]
+    problem = linear_problem(other)  # type: ignore[arg-type]
+    again = replace(
+        explained, problem=problem, taken=problem.estimator.at(explained.taken, explained.taken.z)
+    )
+    proof = confirmed(again, BLIND)  # type: ignore[arg-type]
+    assert proof.unseen == ()
+    assert [step.effect for step in proof.candidates] == [VISCOUS]
+
+
+@pytest.mark.parametrize(("times_s", "passes"), [((1.0,), 1), ((1.0, 2.0), 1), ((1.0, 4.0), 2)])
+def test_a_place_is_passed_as_often_as_it_shows_again_later(times_s: tuple[float, ...], passes: int) -> None:
+    fitted = linear({VISCOUS: 3.0}, RESPONSES)
+    index = fitted.index
+    there = [(index.recording == 1) & (np.abs(index.t_s - at) < 0.2) for at in times_s]
+    response = 4.0 * np.any(there, axis=0)
+    explained = explain(linear_problem(replace(fitted, responses={**RESPONSES, VISCOUS: response})))
+    (step,) = explained.steps
+    assert confirmation._passes(explained, step.base) == passes
 
 
 def test_every_threshold_says_what_it_means_and_where_it_comes_from() -> None:

@@ -74,7 +74,9 @@ def _chassis(concealed: Concealed) -> str:
     up = (base.mass * concealed.com_height - 2.0 * WHEEL_MASS * height) / mass - height
     wheels = 2.0 * WHEEL_MASS * (concealed.com_ahead**2 + half_track**2 + 0.3 * height**2)
     yaw = base.yaw_inertia - wheels - mass * (ahead - concealed.com_ahead) ** 2
-    inertia = f"{CHASSIS_ROLL_INERTIA} {CHASSIS_PITCH_INERTIA} {yaw!r}"
+    # No body turns harder about one axis than about the other two together.
+    roll = max(CHASSIS_ROLL_INERTIA, yaw - CHASSIS_PITCH_INERTIA)
+    inertia = f"{roll!r} {CHASSIS_PITCH_INERTIA} {yaw!r}"
     left, right = radii(concealed)
     return (
         f'<body name="chassis" pos="0 0 {height + _unevenness(concealed)!r}"><freejoint/>'

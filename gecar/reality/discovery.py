@@ -219,6 +219,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             if motion.explained.problem.on_bench
             else (),
             motion.encoders_left_out,
+            [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen],
         ),
         evidence=Evidence(
             motion.explained,
@@ -337,7 +338,7 @@ def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
                 spans = {**small, **spans}
             if explained.steps and explained.problem.on_bench:
                 spans = along_valleys(explained.problem, explained.taken, spans)
-            return _Stage(explained, candidates, spans)
+            return _Stage(explained, candidates, confirmation.unseen, spans)
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
 

@@ -9,6 +9,7 @@ import numpy as np
 from gecar.reality.recordings.split import Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.world.effects import BY_ID
 
 
 def notes_on(
@@ -19,6 +20,7 @@ def notes_on(
     candidates: Sequence[str] = (),
     alike: Sequence[Sequence[str]] = (),
     encoders_left_out: bool = False,
+    unseen: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
@@ -38,11 +40,22 @@ def notes_on(
         Sets of effects of which one can be larger and another smaller at hardly any cost.
     encoders_left_out
         Whether the encoders were left out, as nothing explains them.
+    unseen
+        Effects found that the recordings set aside do not show.
     """
     notes = [
         f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
         "contains its neutral value: a candidate, not a finding."
         for effect in candidates
+    ]
+    notes += [
+        f"The held-out recordings do not show {effect}. It was found on the others, "
+        + (
+            "which pass its place more than once."
+            if BY_ID[effect].at_a_place
+            else "and each that shows it, left out, confirms it."
+        )
+        for effect in unseen
     ]
     if encoders_left_out:
         notes.append(

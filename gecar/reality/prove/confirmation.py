@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
+from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import worsens
@@ -19,6 +20,9 @@ from gecar.reality.selection.thresholds import MAIN_SHARE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
+LEAST_SHOWN = 25.0  # squared standard deviations: what shows an effect by itself
+WHOLLY = 0.1  # by which the bounds of a share may differ from 1 where all of an effect is asked for
+APART_S = 1.5  # between two passes of a place
 
 
 @dataclass(frozen=True)
@@ -31,19 +35,23 @@ class Confirmation:
         The explanation with the effects asked for there; each step has its ``holdout_gain``.
     candidates
         Effects that are not: proved where they were fitted, and no findings.
+    unseen
+        Effects that they do not show, and that each recording fitted on which does confirms when it is left out.
     """
 
     explained: Explanation
     candidates: tuple[Step, ...]
+    unseen: tuple[str, ...]
 
 
 def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
-    it was fitted, predicts worse than none (`share_asked_for`). A place on the floor that none of them passes stays.
-    Whole drives must not come out worse with the effect; where much is left that nothing explains, they must come out
-    better.
+    it was fitted, predicts worse than none (`share_asked_for`). Where they do not show an effect at all, the
+    recordings fitted on that do must ask for it, each with everything fitted to the others; a place on the floor must
+    then have been passed twice. Whole drives must not come out worse with the effect; where much is left that nothing
+    explains, they must come out better.
 
     Parameters
     ----------
@@ -52,24 +60,35 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     held
         Residuals of the same kind, of the recordings set aside.
     """
-    candidates = list[Step]()
+    candidates, unseen = list[Step](), set[str]()
     while explained.steps and held.recordings:
         with_all = _held_errors(explained, held, explained.taken, explained.taken)
         without = {s.effect: _without(explained.problem, explained.taken, s) for s in explained.steps}
         judged = [_judged(explained, held, step, without[step.effect], with_all) for step in explained.steps]
+        unseen = {s.effect for s, share in judged if share is UNSEEN}
+        places = {s.effect for s in explained.steps if s.effect in unseen and BY_ID[s.effect].at_a_place}
+        judged = [
+            _left_out(explained, s, without[s.effect]) if s.effect in unseen - places else (s, share)
+            for s, share in judged
+        ]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        shown = [(s, share) for s, share in judged if not (share is UNSEEN and BY_ID[s.effect].at_a_place)]
-        failing = [pair for pair in shown if pair[1].margin <= 0.0]
+        seen_again = {e for e in places if _passes(explained, without[e]) > 1}
+        failing = [(s, share) for s, share in judged if share.margin <= 0.0 and s.effect not in seen_again]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)
         else:
-            useless = [step for step, _ in shown if not _helps(explained, held, without[step.effect])]
+            useless = [
+                s
+                for s, share in judged
+                if s.effect not in places and not _helps(explained, held, without[s.effect], share)
+            ]
             if not useless:
                 break
             worst = useless[0]
         candidates.append(worst)
         explained = dropped(explained, worst)
-    return Confirmation(explained, tuple(candidates))
+    named = [step.effect for step in explained.steps]
+    return Confirmation(explained, tuple(candidates), tuple(effect for effect in named if effect in unseen))
 
 
 def _judged(
@@ -88,10 +107,55 @@ def _judged(
     return replace(step, holdout_gain=gain), UNSEEN if unseen else min(shares, key=lambda share: share.margin)
 
 
-def _helps(explained: Explanation, held: Residuals, without: Model) -> bool:
-    """Whether whole drives set aside come out no worse with an effect; or much better, where much is unexplained."""
+def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step, Share]:
+    """Return a step with what it gains on recordings fitted on, each left out, and the share of it that they ask for.
+
+    Of two or more that show it; else nothing can be said without the one: `UNSEEN`.
+    """
+    problem, with_it = explained.problem, explained.taken
+    change = problem.residuals.errors(without.physics) - problem.residuals.errors(with_it.physics)
+    shown = np.flatnonzero(np.bincount(problem.residuals.index.recording, change**2) >= LEAST_SHOWN)
+    if len(shown) < 2:
+        return step, UNSEEN
+    parts = []
+    for k in shown:
+        rest, alone = problem.without(int(k))
+        before = rest.estimator.at(with_it, with_it.z)
+        fitted = rest.under(before).estimator.fit(with_it.effects, with_it.values)
+        others = replace(explained, problem=rest.under(fitted), taken=fitted)
+        base = _without(rest, fitted, step)
+        parts.append(
+            [_held_errors(others, alone, model, beside)
+             for model, beside in ((fitted, fitted), (base, fitted), (base, base))]
+        )  # fmt: skip
+    with_all, left, least = (np.concatenate(errors) for errors in zip(*parts, strict=True))
+    index = problem.residuals.part(shown).index
+    shares = [share_asked_for(index, errors, with_all) for errors in (left, least)]
+    gained = replace(step, holdout_gain=cost(left) - cost(with_all))
+    return gained, UNSEEN if shares[0] is UNSEEN else min(shares, key=lambda share: share.margin)
+
+
+def _passes(explained: Explanation, without: Model) -> int:
+    """Return how often recordings fitted on show an effect, `APART_S` or more apart: what shows once is an event."""
+    residuals = explained.problem.residuals
+    change = residuals.errors(without.physics) - residuals.errors(explained.taken.physics)
+    passes = 0
+    for number in np.unique(residuals.index.recording):
+        own = residuals.index.recording == number
+        span = (residuals.index.t_s[own] / SPAN_S).astype(int)
+        shown_s = SPAN_S * np.flatnonzero(np.bincount(span, change[own] ** 2) >= LEAST_SHOWN)
+        passes += int(len(shown_s) > 0) + int(np.sum(np.diff(shown_s) > APART_S))
+    return passes
+
+
+def _helps(explained: Explanation, held: Residuals, without: Model, share: Share) -> bool:
+    """Whether whole drives set aside come out no worse with an effect.
+
+    They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
+    not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray.
+    """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    if not explained.unexplained:
+    if not explained.unexplained or (share.low > 1.0 - WHOLLY and share.high < 1.0 + WHOLLY):
         return not worsens(problem, without, explained.taken, sizes)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     now, before = (problem.material.times(sizes.left(physics)) for physics in beside)

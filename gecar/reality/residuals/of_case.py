@@ -110,6 +110,10 @@ class Residuals:
         """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
         return np.array([r.nuisances.clock_offset_s for r in self.recordings])
 
+    def part(self, numbers: Sequence[int] | npt.NDArray[np.int64]) -> Residuals:
+        """Return these of some of the recordings, by number."""
+        return replace(self, recordings=tuple(self.recordings[k] for k in numbers))
+
     def without_encoders(self) -> Residuals:
         """Return these of the recordings with poses, without what their encoders measured and without nuisances."""
         seen = [run for run in self.recordings if run.replayer.has_poses]

@@ -78,6 +78,14 @@ class Problem:
         """Whether all recordings were made on a bench."""
         return self.estimator.on_bench
 
+    def without(self, number: int) -> tuple[Problem, Residuals]:
+        """Return the problem without one recording, and that recording's residuals."""
+        numbers = [k for k in range(len(self.residuals.recordings)) if k != number]
+        rest = self.residuals.part(numbers)
+        estimator = Estimator(rest, self.estimator.robot, self.estimator.rng)
+        problem = replace(self, estimator=estimator, sizes=self.sizes.of(rest), known=estimator.known())
+        return problem, self.residuals.part([number])
+
     def under(self, model: Model, free_effects: Sequence[str] | None = None) -> Problem:
         """Return the problem with the discrepancy that a model leaves; effects that are free (its own) are no part.
 
