@@ -56,6 +56,7 @@ def test_table_1_is_read_in_its_order() -> None:
         ("<a> ::= one \\\n  two\n  three\n\n  four", [("one two\nthree\nfour",)]),
         ("<a> ::= x[GE_RANGE:2] | GE_RANGE:3 | 'GE_RANGE:3'", [("x[GE_RANGE:2]",), *"012", ("GE_RANGE:3",)]),
         ("<a> ::= GE_RANGE:dataset_n_vars", [*"01"]),
+        ("<a> ::= GE_RANGE:-1..2", [("-1",), *"012"]),
     ],
 )
 def test_alternatives_are_read_as_ponyge2_does(text: str, wanted: list[tuple[str | int, ...]]) -> None:
@@ -92,6 +93,8 @@ def test_alternatives_are_read_as_ponyge2_does(text: str, wanted: list[tuple[str
             "line 1, column 9: found GE_RANGE:300, expected GE_RANGE: and one of 1..256",
         ),
         ("<a> ::= GE_RANGE:rows", "found GE_RANGE:rows, expected GE_RANGE: and one of 1..256, n_vars"),
+        ("<a> ::= GE_RANGE:-200..200", "found GE_RANGE:-200..200, expected GE_RANGE: and one of 1..256"),
+        ("<a> ::= GE_RANGE:2..1", "found GE_RANGE:2..1, expected GE_RANGE: and one of 1..256"),
         ("<a> ::= GE_RANGE:3 <a>", "found GE_RANGE:3 with more behind it"),
         ("<a> ::= GE_GENERATE:[]", "found GE_GENERATE, which runs code"),
         ("<a> ::= " + "|".join("x" * 257), "found alternative 257 of <a>, expected at most 256"),
@@ -137,7 +140,8 @@ def test_a_grammar_is_found_by_name_and_by_path(tmp_path: Path, monkeypatch: pyt
     assert alternatives(load_grammar("ours")) == alternatives(load_grammar("ours.bnf")) == [("ours",)]
     assert load_grammar("rich").start == "<code>"
     with pytest.raises(
-        InputError, match=r"'none', expected a \.bnf file or one of keijzer_6, memory, nested, ours, paper"
+        InputError,
+        match=r"'none', expected a \.bnf file or one of fine, keijzer_6, memory, nested, ours, paper",
     ):
         load_grammar("none")
     with pytest.raises(InputError, match="directory"):

@@ -23,13 +23,24 @@ SMALL = {
 }
 
 
-@pytest.mark.parametrize("name", ["paper", "proportional", "memory", "nested", "rich", "rich_one_sensor"])
+@pytest.mark.parametrize(
+    "name", ["paper", "fine", "proportional", "memory", "nested", "rich", "rich_one_sensor"]
+)
 def test_every_program_of_a_shipped_grammar_is_derived_again(name):
     mapper = Mapper(load_grammar(name))
     mapped = mapper.map(np.random.default_rng(5).integers(0, 256, (40, 500), np.uint8))
     programs = [parse_program(mapped.program(i).source) for i in np.flatnonzero(mapped.valid)]
     genomes = np.array([genome_of(mapper, program, 900) for program in programs])
     again = mapper.map(genomes)
+    assert [again.program(i).canonical for i in range(len(programs))] == [p.canonical for p in programs]
+    assert len(programs) > 10
+
+
+def test_every_program_of_table_3_can_be_refined_in_steps_of_one():
+    coarse, fine = (Mapper(load_grammar(name)) for name in ("paper", "fine"))
+    mapped = coarse.map(np.random.default_rng(6).integers(0, 256, (40, 500), np.uint8))
+    programs = [parse_program(mapped.program(i).source) for i in np.flatnonzero(mapped.valid)]
+    again = fine.map(np.array([genome_of(fine, program, 900) for program in programs]))
     assert [again.program(i).canonical for i in range(len(programs))] == [p.canonical for p in programs]
     assert len(programs) > 10
 

@@ -297,7 +297,7 @@ def test_any_text_is_a_program_or_an_input_error(text: str) -> None:
         assert parse_program(program.source) == program
 
 
-@pytest.mark.parametrize("name", ["paper", "rich", "rich_one_sensor", "nested"])
+@pytest.mark.parametrize("name", ["paper", "fine", "rich", "rich_one_sensor", "nested"])
 def test_shipped_grammars_speak_the_robot_language(name: str) -> None:
     grammar = load_grammar(name)
     assert grammar.warnings == ()

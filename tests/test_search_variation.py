@@ -122,6 +122,18 @@ def test_creep_moves_numbers_by_one_step_and_nothing_else() -> None:
     assert np.array_equal(first.symbols, second.symbols)
 
 
+def test_creep_takes_short_steps_more_often_than_long_ones_and_none_beyond_its_reach() -> None:
+    mapper = Mapper(parse_grammar("<n> ::= GE_RANGE:-100..100"))
+    before = np.arange(201, dtype=np.uint8).repeat(100)[:, None]
+    after = mapper.map(Creep(1.0, reach=0.1)(before.copy(), mapper, spawn(1, 1, 0, len(before)))).choices
+    steps = np.abs(after.astype(int) - before.ravel())
+    assert set(steps.tolist()) == set(range(1, 21))
+    # Lengths below x have probability log x / log 20.1.
+    assert np.mean(steps < 5) == pytest.approx(np.log(5) / np.log(20.1), abs=0.02)
+    ends = np.mean(np.sign(after.astype(int) - before.ravel()) > 0)
+    assert ends == pytest.approx(0.5, abs=0.02)
+
+
 def test_creep_goes_by_the_numbers_values_not_by_their_place_in_the_file() -> None:
     genomes = np.array([[1, choice] for choice in (0, 1, 2)] * 20, np.uint8)
     moved = RICH.map(Creep(1.0)(genomes.copy(), RICH, spawn(1, 1, 0, 60)))

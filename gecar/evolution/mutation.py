@@ -121,7 +121,10 @@ def _number(parts: tuple[str | int, ...]) -> float:
 
 @dataclass(frozen=True)
 class Creep:
-    """Codons that choose a number step to the next number up or down; at an end, inwards.
+    """Codons that choose a number step up or down among its rule's; where that would pass an end, the other way.
+
+    Small steps are the more likely: the length's logarithm is uniform (as in Muehlenbein and Schlierkamp-Voosen's
+    breeder GA, Evolutionary Computation 1(1), 1993), so that coarse and fine changes of a long list are equally tried.
 
     Attributes
     ----------
@@ -129,10 +132,13 @@ class Creep:
         Probability of each such codon.
     most
         How many of a genome step on average, at most, so that long programs are not changed all over.
+    reach
+        No step is as long as this share of its rule's numbers, or as two numbers if that is more.
     """
 
     rate: float
     most: float = math.inf
+    reach: float = 0.0
     change = CREEP
     linear = True
 
@@ -141,7 +147,9 @@ class Creep:
         mapped = mapper.map(genomes)
         size = mapper.options.codon_size
         scale = _scale(mapper.grammar, size)
-        _creep(genomes, mapped.offsets, mapped.symbols, scale, self.rate, self.most, size, streams)
+        _creep(
+            genomes, mapped.offsets, mapped.symbols, scale, self.rate, self.most, self.reach, size, streams
+        )
         return genomes
 
 
@@ -153,6 +161,7 @@ def _creep(
     scale: Scale,
     rate: float,
     most: float,
+    reach: float,
     size: int,
     streams: Streams,
 ) -> None:
@@ -170,6 +179,8 @@ def _creep(
                 first, n = scale.first[symbol], scale.first[symbol + 1] - scale.first[symbol]
                 codon = int(genomes[i, k])
                 step = 1 - 2 * below(streams[i], 2)
+                if reach * n > 2.0:
+                    step *= int(math.exp(uniform(streams[i]) * math.log(reach * n)))
                 rank = scale.rank[first + codon % n]
                 rank = rank + step if 0 <= rank + step < n else rank - step
                 moved = codon - codon % n + scale.at_rank[first + rank]

@@ -93,7 +93,11 @@ class Operators:
         goals = GOALS[settings.replacement](settings)
         select = select or (goals.select if goals else SELECTIONS[settings.selection](settings))
         replace = replace or (goals.replace if goals else REPLACEMENTS[settings.replacement])
-        creep = (Creep(settings.creep_rate, settings.creep_most),) if settings.creep_rate else ()
+        creep = (
+            (Creep(settings.creep_rate, settings.creep_most, settings.creep_reach),)
+            if settings.creep_rate
+            else ()
+        )
         grow = (Duplicate(GROWN, LONGEST), *creep)
         duplicate = (Duplicate(settings.duplication_rate, LONGEST),) if settings.duplication_rate else ()
         if settings.mutation == "renew" and mutation is None:

@@ -50,9 +50,11 @@ class EvolutionSettings(BaseModel):
     mutation_rate
         Probability that a codon is replaced by a random one.
     creep_rate
-        Probability that a used codon that chooses a number changes to a neighbouring number.
+        Probability that a used codon that chooses a number changes to a number near it.
     creep_most
         Largest mean number of such changes per child; inf: no limit.
+    creep_reach
+        No such change is as large as this share of the numbers there are; 0: always to a neighbouring number.
     duplication_rate
         Probability that one of a child's subtrees is duplicated, in a child of at most
         `gecar.evolution.operators.LONGEST` codons.
@@ -98,6 +100,7 @@ class EvolutionSettings(BaseModel):
     mutation_rate: Rate = 0.05
     creep_rate: Rate = 0.0
     creep_most: float = Field(math.inf, gt=0.0)
+    creep_reach: float = Field(0.0, ge=0.0, le=0.5)
     duplication_rate: Rate = 0.0
     duplicates: Literal["kept", "generation", "run"] = "kept"
     attempts: int = Field(10, ge=1, le=1_000)

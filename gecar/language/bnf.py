@@ -6,6 +6,7 @@ A grammar file is read as PonyGE2 reads its own (Fenton et al. 2017, doi:10.1145
              | "if " <test> ":\n  " <op>  # alternatives may go on over several lines
     <op>   ::= motor(<num>, <num>, 100)
     <num>  ::= GE_RANGE:10                # 0 | 1 | ... | 9; or a name, GE_RANGE:dataset_n_vars
+    <duty> ::= GE_RANGE:-100..100         # -100 | -99 | ... | 100, which PonyGE2 has not
 
 - A nonterminal is ``<name>``: no blanks, ``<``, ``>`` or ``|`` within. A ``<`` that begins no name is text,
   so ``SensorValue<=<num>`` means what it seems to.
@@ -213,7 +214,7 @@ class _Reader:
             )
 
     def ranged(self, pieces: list[_Piece]) -> list[Alternative]:
-        """Spell out ``GE_RANGE:n``; nothing for any other alternative."""
+        """Spell out ``GE_RANGE:n`` and ``GE_RANGE:n..m``; nothing for any other alternative."""
         value, offset = pieces[0].value, pieces[0].offset
         if isinstance(value, Reference) or not pieces[0].plain:
             return []
@@ -224,13 +225,20 @@ class _Reader:
         if not value.startswith("GE_RANGE:"):
             return []
         name = value.removeprefix("GE_RANGE:").strip()
-        count = int(name) if re.fullmatch(r"[0-9]{1,9}", name) else self.ranges.get(name, 0)
-        if len(pieces) > 1 or not 1 <= count <= MAX_ALTERNATIVES:
+        ends = re.fullmatch(r"(-?[0-9]{1,9})\.\.(-?[0-9]{1,9})", name)
+        if ends:
+            numbers = range(int(ends[1]), int(ends[2]) + 1)
+        else:
+            numbers = range(int(name) if re.fullmatch(r"[0-9]{1,9}", name) else self.ranges.get(name, 0))
+        if len(pieces) > 1 or not 1 <= len(numbers) <= MAX_ALTERNATIVES:
             known = "".join(f", {known}" for known in self.ranges)
             found = value if len(pieces) == 1 else f"{value} with more behind it"
-            wanted = f"GE_RANGE: and one of 1..{MAX_ALTERNATIVES}{known}, alone between the |"
+            wanted = (
+                f"GE_RANGE: and one of 1..{MAX_ALTERNATIVES}{known}, or the first and the last of as many numbers "
+                "(-5..5), alone between the |"
+            )
             raise self.fault(offset, found, wanted)
-        return [Alternative(offset, [str(number)]) for number in range(count)]
+        return [Alternative(offset, [str(number)]) for number in numbers]
 
     def line_at(self, offset: int) -> str:
         line = self.text[offset : offset + 40].split("\n", 1)[0]

@@ -75,6 +75,7 @@ _BETTER = Settings(
     mutation_rate=0.05,
     creep_rate=0.3,
     creep_most=2.0,
+    creep_reach=0.09,
     restart_after=10,
     restart="grown",
     draws=16,
