@@ -11,14 +11,20 @@ import numpy as np
 
 from gecar.reality.fitting.parameters import free
 from gecar.reality.materiality import Size
-from gecar.reality.recordings.recording import make_recording
+from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")
 ROW_S, SECONDS = 0.01, 6.0
-RUN = make_recording("made", {n: np.arange(3.0) for n in ("t_s", "left_duty_pct", "right_duty_pct")})
+
+
+def run(gap_s: float | None) -> Recording:
+    """Return a recording of commands, without the row at a time."""
+    t_s = np.arange(0.0, SECONDS, 0.1)
+    kept = np.ones(len(t_s), bool) if gap_s is None else np.abs(t_s - gap_s) > 0.05
+    return make_recording("made", dict.fromkeys(("t_s", "left_duty_pct", "right_duty_pct"), t_s[kept]))
 
 
 @dataclass(frozen=True)
@@ -30,10 +36,11 @@ class LinearResiduals:
     noise: np.ndarray
     count: int
     sensor: bool = False
+    gap_s: float | None = None
 
     @property
     def recordings(self) -> tuple[Any, ...]:
-        return tuple(SimpleNamespace(recording=RUN) for _ in range(self.count))
+        return tuple(SimpleNamespace(recording=run(self.gap_s)) for _ in range(self.count))
 
     def gyro_errors(self) -> np.ndarray:
         return np.zeros((len(self.noise), 3))

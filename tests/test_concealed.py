@@ -33,7 +33,7 @@ from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth
 from gecar.parallel import run_parallel
 from gecar.parallel.executors import SerialExecutor
-from gecar.reality import discovery
+from gecar.reality.prove import confirmation
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -267,10 +267,10 @@ def test_examination_goes_on_with_the_seed_it_began_with(tmp_path):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_comparators_replace_parts_that_are_there(name):
-    explain = discovery.explain
+    explain = confirmation.explain
     with changed(name):
         assert all(vars(owner)[part] is other for owner, part, other in METHODS[name])
-    assert discovery.explain is explain
+    assert confirmation.explain is explain
 
 
 def test_program_follows_the_line_to_the_goal(tmp_path):

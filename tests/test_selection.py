@@ -308,15 +308,21 @@ def test_an_imitation_that_recordings_set_aside_do_not_show_is_a_candidate() -> 
     assert [step.effect for step in proof.candidates] == [VISCOUS]
 
 
-@pytest.mark.parametrize(("times_s", "passes"), [((1.0,), 1), ((1.0, 2.0), 1), ((1.0, 4.0), 2)])
-def test_a_place_is_passed_as_often_as_it_shows_again_later(times_s: tuple[float, ...], passes: int) -> None:
-    fitted = linear({VISCOUS: 3.0}, RESPONSES)
+@pytest.mark.parametrize(
+    ("times_s", "gap_s", "beside"),
+    [((2.0,), None, False), ((2.0,), 1.7, True), ((2.0,), 4.0, False), ((2.0, 5.0), 1.7, False)],
+)
+def test_a_place_that_shows_once_where_a_row_is_missing_may_be_that_row(
+    times_s: tuple[float, ...], gap_s: float | None, beside: bool
+) -> None:
+    fitted = replace(linear({VISCOUS: 3.0}, RESPONSES), gap_s=gap_s)
     index = fitted.index
     there = [(index.recording == 1) & (np.abs(index.t_s - at) < 0.2) for at in times_s]
-    response = 4.0 * np.any(there, axis=0)
-    explained = explain(linear_problem(replace(fitted, responses={**RESPONSES, VISCOUS: response})))
+    explained = explain(
+        linear_problem(replace(fitted, responses={**RESPONSES, VISCOUS: 4.0 * np.any(there, axis=0)}))
+    )
     (step,) = explained.steps
-    assert confirmation._passes(explained, step.base) == passes
+    assert confirmation._is_beside_a_gap(explained, step.base) == beside
 
 
 def test_every_threshold_says_what_it_means_and_where_it_comes_from() -> None:
@@ -340,3 +346,15 @@ def test_recordings_that_do_not_show_an_effect_ask_for_any_share() -> None:
     errors = bumps(1, 3, 1.0)
     assert share_asked_for(still, errors, errors + 1e-3) is UNSEEN
     assert share_asked_for(still, errors, errors + 0.1) is not UNSEEN
+
+
+def test_what_stood_in_for_a_cause_makes_room_for_it_when_it_is_refused() -> None:
+    """On the recordings fitted on, drag responds as inertia does and fits a little better; elsewhere it does not."""
+    apart = bumps(7, 4, 0.05)
+    fitted = linear({INERTIA: 8.0}, {**RESPONSES, VISCOUS: RESPONSES[INERTIA] + apart})
+    problem = linear_problem(replace(fitted, noise=fitted.noise + 7.0 * apart))
+    held = linear({INERTIA: 8.0}, RESPONSES, seed=5)
+    assert [step.effect for step in explain(problem).steps] == [VISCOUS]
+    proof = confirmation.explained_and_confirmed(problem, held)  # type: ignore[arg-type]
+    assert [step.effect for step in proof.explained.steps] == [INERTIA]
+    assert [step.effect for step in proof.candidates] == [VISCOUS]

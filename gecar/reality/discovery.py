@@ -29,7 +29,7 @@ from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.prove.confirmation import Confirmation, confirmed, dropped
+from gecar.reality.prove.confirmation import Confirmation, dropped, explained_and_confirmed
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case
@@ -41,7 +41,7 @@ from gecar.reality.selection.acceptance import size_of
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, explain
+from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -257,7 +257,7 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     """Explain how the robot moved; where nothing does, what is left may be at one place of the floor."""
     catalogue = observable(context.catalogue, fitted)
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
-    motion = _with_intervals(context, confirmed(explain(problem), held))
+    motion = _with_intervals(context, explained_and_confirmed(problem, held))
     if motion.explained.unexplained:
         motion = _without_encoders(context, fitted, held) or motion
     if motion.explained.steps:
@@ -276,7 +276,7 @@ def _without_encoders(context: _Context, fitted: Residuals, held: Residuals) -> 
     context.tell("much is unexplained: once more without the encoders")
     catalogue = observable(context.catalogue, blind[0])
     problem = problem_of(blind[0], context.robot, catalogue, context.material, context.seed, context.tell)
-    motion = _with_intervals(context, confirmed(explain(problem), blind[1]))
+    motion = _with_intervals(context, explained_and_confirmed(problem, blind[1]))
     if not motion.explained.steps or motion.explained.unexplained:
         return None
     left = problem.sizes.of(fitted).left(motion.explained.taken.physics)
@@ -297,7 +297,7 @@ def _explain_sensor(
     catalogue = observable(context.catalogue, residuals)
     problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell)
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
-    seen = confirmed(explain(problem), beside)
+    seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     stage = _with_intervals(context, replace(seen, explained=replace(seen.explained, taken=taken)))
     return _with_laws(context, stage, beside)

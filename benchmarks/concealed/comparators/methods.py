@@ -19,6 +19,7 @@ from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.prove import confirmation
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.replay.replayer import Replayer, replayer_of
 from gecar.reality.residuals import of_case
@@ -184,8 +185,8 @@ def without_discrepancy(problem: Problem, *_: object) -> Problem:
 _NO_HOTSPOT = (discovery, "with_spot", lambda explained: explained)
 # By name: what stands in for which part, and where that part is.
 METHODS: dict[str, tuple[tuple[Any, str, object], ...]] = {
-    "bic": ((discovery, "explain", by_bic), _NO_HOTSPOT),
-    "everything": ((discovery, "explain", everything), _NO_HOTSPOT),
+    "bic": ((confirmation, "explain", by_bic), _NO_HOTSPOT),
+    "everything": ((confirmation, "explain", everything), _NO_HOTSPOT),
     "no_whitening": ((of_case, "residuals_of", open_loop_residuals_of), (Blocks, "inflation", _white)),
     "no_discrepancy": ((Problem, "under", without_discrepancy),),
     "no_null": ((stepwise, "judged", without_null),),

@@ -49,12 +49,8 @@ def notes_on(
         for effect in candidates
     ]
     notes += [
-        f"The held-out recordings do not show {effect}. It was found on the others, "
-        + (
-            "which pass its place more than once."
-            if BY_ID[effect].at_a_place
-            else "and each that shows it, left out, confirms it."
-        )
+        f"The held-out recordings do not show {effect}. It was found on the others"
+        + ("." if BY_ID[effect].at_a_place else ", and each that shows it, left out, confirms it.")
         for effect in unseen
     ]
     if encoders_left_out:

@@ -15,7 +15,7 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import worsens
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
-from gecar.reality.selection.stepwise import Explanation, concluded
+from gecar.reality.selection.stepwise import Explanation, concluded, explain
 from gecar.reality.selection.thresholds import MAIN_SHARE
 from gecar.world.effects import BY_ID
 
@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 LEAST_SHOWN = 25.0  # squared standard deviations: what shows an effect by itself
 WHOLLY = 0.1  # by which the bounds of a share may differ from 1 where all of an effect is asked for
 APART_S = 1.5  # between two passes of a place
+GAP = 1.6  # times the usual time between rows from which on one is missing
+BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,30 @@ class Confirmation:
     unseen: tuple[str, ...]
 
 
+def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
+    """Explain recordings, and confirm that; where effects are refused, once more without them.
+
+    What imitates takes the place of a cause that gains less, and leaves nothing when it is dropped.
+    """
+    first = confirmed(explain(problem), held)
+    refused = frozenset(step.effect for step in first.candidates)
+    if not refused or problem.on_bench:
+        return first
+    problem.tell(f"once more without {', '.join(sorted(refused))}")
+    again = confirmed(explain(replace(problem, refused=refused)), held)
+    if len(again.explained.steps) <= len(first.explained.steps):
+        return first
+    return replace(again, candidates=(*first.candidates, *again.candidates))
+
+
 def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
     it was fitted, predicts worse than none (`share_asked_for`). Where they do not show an effect at all, the
     recordings fitted on that do must ask for it, each with everything fitted to the others; a place on the floor must
-    then have been passed twice. Whole drives must not come out worse with the effect; where much is left that nothing
-    explains, they must come out better.
+    then show twice, or where no row of the log is missing. Whole drives must not come out worse with the effect; where
+    much is left that nothing explains, they must come out better.
 
     Parameters
     ----------
@@ -72,8 +90,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             for s, share in judged
         ]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        seen_again = {e for e in places if _passes(explained, without[e]) > 1}
-        failing = [(s, share) for s, share in judged if share.margin <= 0.0 and s.effect not in seen_again]
+        stay = {e for e in places if not _is_beside_a_gap(explained, without[e])}
+        failing = [(s, share) for s, share in judged if share.margin <= 0.0 and s.effect not in stay]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)
         else:
@@ -135,17 +153,25 @@ def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step,
     return gained, UNSEEN if shares[0] is UNSEEN else min(shares, key=lambda share: share.margin)
 
 
-def _passes(explained: Explanation, without: Model) -> int:
-    """Return how often recordings fitted on show an effect, `APART_S` or more apart: what shows once is an event."""
+def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
+    """Whether recordings fitted on show an effect only once, and there a row of the log is missing.
+
+    Then what looks like a place may be a command that came earlier or later than the log says.
+    """
     residuals = explained.problem.residuals
     change = residuals.errors(without.physics) - residuals.errors(explained.taken.physics)
-    passes = 0
-    for number in np.unique(residuals.index.recording):
+    passes = []
+    for number, run in enumerate(residuals.recordings):
         own = residuals.index.recording == number
         span = (residuals.index.t_s[own] / SPAN_S).astype(int)
         shown_s = SPAN_S * np.flatnonzero(np.bincount(span, change[own] ** 2) >= LEAST_SHOWN)
-        passes += int(len(shown_s) > 0) + int(np.sum(np.diff(shown_s) > APART_S))
-    return passes
+        parts = np.split(shown_s, np.flatnonzero(np.diff(shown_s) > APART_S) + 1)
+        passes += [(run.recording.t_s, part[0], part[-1]) for part in parts if len(part)]
+    if len(passes) != 1:
+        return False
+    t, first_s, last_s = passes[0]
+    gaps_s = (t - t[0])[:-1][np.diff(t) > GAP * np.median(np.diff(t))]
+    return bool(np.any((gaps_s > first_s - BEFORE_S) & (gaps_s < last_s + SPAN_S)))
 
 
 def _helps(explained: Explanation, held: Residuals, without: Model, share: Share) -> bool:

@@ -48,6 +48,8 @@ class Problem:
         Called with a line of progress.
     clocks_fitted
         Whether each camera's clock offset was fitted.
+    refused
+        Effects of the catalogue that are not tried, as recordings set aside do not confirm them.
     """
 
     estimator: Estimator
@@ -57,6 +59,7 @@ class Problem:
     known: Model
     tell: Callable[[str], None]
     clocks_fitted: bool = False
+    refused: frozenset[str] = frozenset()
 
     @property
     def residuals(self) -> Residuals:

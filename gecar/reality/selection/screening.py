@@ -67,7 +67,7 @@ class _Trial:
 def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
     estimator = problem.estimator
-    others = [e for e in problem.catalogue if e not in model.effects]
+    others = [e for e in problem.catalogue if e not in model.effects and e not in problem.refused]
     estimator.sensitivities(model, others)  # all at once, in lock step
     trials = [t for t in (_scored(problem, model, e) for e in others) if t]
     trials.sort(key=lambda t: -t.promise)
