@@ -9,7 +9,6 @@ import pytest
 from linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
 from scipy.signal import lfilter
 
-from gecar.reality import discovery
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
 from gecar.reality.prove import confirmation
@@ -369,8 +368,8 @@ def test_what_makes_held_out_readings_worse_is_a_candidate(
     seen = confirmed(explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES))), set_aside([1.0]))  # type: ignore[arg-type]
     found = seen.explained.taken.physics
     monkeypatch.setattr(
-        discovery, "_reading_error", lambda held, physics: error_pct if physics == found else 9.2
+        confirmation, "reading_error", lambda held, physics: error_pct if physics == found else 9.2
     )
-    judged_again = discovery._if_readings_agree(seen, set_aside([1.0]))  # type: ignore[arg-type]
+    judged_again = confirmation.with_better_readings(seen, set_aside([1.0]))  # type: ignore[arg-type]
     assert [step.effect for step in judged_again.explained.steps] == [VISCOUS] * kept
     assert [step.effect for step in judged_again.candidates] == [VISCOUS] * (not kept)

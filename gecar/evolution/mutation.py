@@ -121,7 +121,7 @@ def _number(parts: tuple[str | int, ...]) -> float:
 
 @dataclass(frozen=True)
 class Creep:
-    """Codons that choose a number step up or down among its rule's; where that would pass an end, the other way.
+    """Numbers move up or down in the list they are chosen from; a step that would pass an end goes the other way.
 
     Small steps are the more likely: the length's logarithm is uniform (as in Muehlenbein and Schlierkamp-Voosen's
     breeder GA, Evolutionary Computation 1(1), 1993), so that coarse and fine changes of a long list are equally tried.

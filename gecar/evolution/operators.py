@@ -109,7 +109,7 @@ class Operators:
 
     @property
     def archive(self) -> MapElites | None:
-        """MAP-Elites, where it chooses who lives on."""
+        """The MAP-Elites that chooses who lives on; None if something else does."""
         algorithm = _algorithm(self.replace)
         return algorithm if isinstance(algorithm, MapElites) else None
 
@@ -136,7 +136,7 @@ class Operators:
 
 
 def _algorithm(operator: Any) -> Any:
-    """Return what an operator belongs to, if it is a method, or else the operator."""
+    """Return the object that a method belongs to; any other operator as it is."""
     return getattr(operator, "__self__", operator)
 
 

@@ -29,7 +29,12 @@ from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.prove.confirmation import Confirmation, dropped, explained_and_confirmed
+from gecar.reality.prove.confirmation import (
+    Confirmation,
+    dropped,
+    explained_and_confirmed,
+    with_better_readings,
+)
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case
@@ -42,7 +47,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import SIGNIFICANCE, WORSE
+from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -299,32 +304,9 @@ def _explain_sensor(
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
     seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
-    stage = _with_intervals(
-        context, _if_readings_agree(replace(seen, explained=replace(seen.explained, taken=taken)), beside)
-    )
+    seen = with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), beside)
+    stage = _with_intervals(context, seen)
     return _with_laws(context, stage, beside)
-
-
-def _if_readings_agree(seen: Confirmation, held: Residuals) -> Confirmation:
-    """Return what was confirmed, or nothing named where held-out readings as a whole come out worse with it.
-
-    What is confirmed beside small changes of line and mount, which no robot file has, may need them.
-    """
-    explained = seen.explained
-    while explained.steps and held.recordings:
-        known, found = explained.problem.known.physics, explained.taken.physics
-        if _reading_error(held, found) <= WORSE * _reading_error(held, known):
-            break
-        weakest = min(explained.steps, key=lambda step: step.holdout_gain)
-        explained = dropped(explained, weakest)
-        seen = replace(seen, explained=explained, candidates=(*seen.candidates, weakest))
-    return seen
-
-
-def _reading_error(held: Residuals, physics: npt.NDArray[Any]) -> float:
-    """Return how far a robot's readings along the measured paths are off (root mean square) [%]."""
-    off = [run.recording.reflection_pct - run.readings(physics) for run in held.recordings]
-    return float(np.sqrt(np.nanmean(np.concatenate(off) ** 2)))
 
 
 def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:

@@ -47,7 +47,7 @@ class Choice(NamedTuple):
 
     @property
     def lead(self) -> float:
-        """How many times as much as the one that was taken the best of the others leaves; 0: nobody can tell."""
+        """What the best of the others leaves, as a multiple of what the one taken does; 0 if that is not known."""
         taken = [r.left for r in self.rivals if r.taken]
         others = [r.left for r in self.rivals if not r.taken]
         ratio = min(others) / max(taken[0], 1e-9) if taken and others else 0.0
@@ -100,7 +100,7 @@ def choices(verdict: Verdict) -> tuple[Choice, ...]:
 def _candidates(
     problem: Problem, step: Step | None, tried: tuple[Step, ...]
 ) -> tuple[Model, dict[str, Model]]:
-    """Return what had been taken before an effect, and it and its runners-up fitted on top of that, by effect."""
+    """Return the model before an effect was taken, and those with it or a runner-up on top, by effect."""
     first = step or (tried[0] if tried else None)
     base = first.base if first else problem.known
     models = {other.effect: other.model for other in tried if set(base.effects) == set(other.base.effects)}

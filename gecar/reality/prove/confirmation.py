@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,12 +12,14 @@ from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.prove.holdout import reading_error
+from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import worsens
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
+from gecar.reality.selection.share import UNSEEN, Share, share_asked_for, sums_of_spans
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
-from gecar.reality.selection.thresholds import MAIN_SHARE
+from gecar.reality.selection.thresholds import MAIN_SHARE, WORSE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
@@ -47,7 +50,7 @@ class Confirmation:
 
 
 def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
-    """Explain recordings, and confirm that; where effects are refused, once more without them.
+    """Explain recordings and confirm the effects; where some are refused, explain once more without those.
 
     What imitates takes the place of a cause that gains less, and leaves nothing when it is dropped.
     """
@@ -119,20 +122,26 @@ def _judged(
     ``without`` is the model without it; ``with_all`` are the residuals under all steps, shape (n,).
     """
     left = [_held_errors(explained, held, without, beside) for beside in (explained.taken, without)]
-    gain = cost(left[0]) - cost(with_all)
-    shares = [share_asked_for(held.index, errors, with_all) for errors in left]
-    unseen = shares[0] is UNSEEN
-    return replace(step, holdout_gain=gain), UNSEEN if unseen else min(shares, key=lambda share: share.margin)
+    return _asked_for(step, held.index, left, with_all)
+
+
+def _asked_for(
+    step: Step, index: ResidualIndex, without: Sequence[Array], with_all: Array
+) -> tuple[Step, Share]:
+    """Return a step with what it gains, and the share of it that is asked for, by residuals without it and with it."""
+    shares = [share_asked_for(index, errors, with_all) for errors in without]
+    least = UNSEEN if shares[0] is UNSEEN else min(shares, key=lambda share: share.margin)
+    return replace(step, holdout_gain=cost(without[0]) - cost(with_all)), least
 
 
 def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step, Share]:
-    """Return a step with what it gains on recordings fitted on, each left out, and the share of it that they ask for.
+    """Return the same of the recordings fitted on that show it, each left out in turn with everything fitted anew.
 
-    Of two or more that show it; else nothing can be said without the one: `UNSEEN`.
+    Two or more must show it; without the only one nothing is known of it: `UNSEEN`.
     """
     problem, with_it = explained.problem, explained.taken
-    change = problem.residuals.errors(without.physics) - problem.residuals.errors(with_it.physics)
-    shown = np.flatnonzero(np.bincount(problem.residuals.index.recording, change**2) >= LEAST_SHOWN)
+    by_recording = np.bincount(problem.residuals.index.recording, _shown(explained, without))
+    shown = np.flatnonzero(by_recording >= LEAST_SHOWN)
     if len(shown) < 2:
         return step, UNSEEN
     parts = []
@@ -146,27 +155,28 @@ def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step,
             [_held_errors(others, alone, model, beside)
              for model, beside in ((fitted, fitted), (base, fitted), (base, base))]
         )  # fmt: skip
-    with_all, left, least = (np.concatenate(errors) for errors in zip(*parts, strict=True))
-    index = problem.residuals.part(shown).index
-    shares = [share_asked_for(index, errors, with_all) for errors in (left, least)]
-    gained = replace(step, holdout_gain=cost(left) - cost(with_all))
-    return gained, UNSEEN if shares[0] is UNSEEN else min(shares, key=lambda share: share.margin)
+    with_all, *left = (np.concatenate(errors) for errors in zip(*parts, strict=True))
+    return _asked_for(step, problem.residuals.part(shown).index, left, with_all)
+
+
+def _shown(explained: Explanation, without: Model) -> Array:
+    """Return by how much an effect changes each residual fitted on, squared, shape (n,)."""
+    errors = explained.problem.residuals.errors
+    return np.asarray((errors(without.physics) - errors(explained.taken.physics)) ** 2)
 
 
 def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
-    """Whether recordings fitted on show an effect only once, and there a row of the log is missing.
+    """Whether an effect shows only once in the recordings fitted on, and a row of the log is missing there.
 
     Then what looks like a place may be a command that came earlier or later than the log says.
     """
     residuals = explained.problem.residuals
-    change = residuals.errors(without.physics) - residuals.errors(explained.taken.physics)
     passes = []
-    for number, run in enumerate(residuals.recordings):
-        own = residuals.index.recording == number
-        span = (residuals.index.t_s[own] / SPAN_S).astype(int)
-        shown_s = SPAN_S * np.flatnonzero(np.bincount(span, change[own] ** 2) >= LEAST_SHOWN)
+    for number, sums in sums_of_spans(residuals.index, _shown(explained, without)).items():
+        shown_s = SPAN_S * np.flatnonzero(sums >= LEAST_SHOWN)
         parts = np.split(shown_s, np.flatnonzero(np.diff(shown_s) > APART_S) + 1)
-        passes += [(run.recording.t_s, part[0], part[-1]) for part in parts if len(part)]
+        log_s = residuals.recordings[number].recording.t_s
+        passes += [(log_s, part[0], part[-1]) for part in parts if len(part)]
     if len(passes) != 1:
         return False
     t, first_s, last_s = passes[0]
@@ -186,6 +196,22 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     now, before = (problem.material.times(sizes.left(physics)) for physics in beside)
     return now**2 < (1.0 - MAIN_SHARE) * before**2
+
+
+def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
+    """Drop, one by one, effects of the colour sensor while held-out readings as a whole are worse with them.
+
+    What is confirmed beside small changes of line and mount, which no robot file has, may need them.
+    """
+    explained = seen.explained
+    while explained.steps and held.recordings:
+        known, found = explained.problem.known.physics, explained.taken.physics
+        if reading_error(held, found) <= WORSE * reading_error(held, known):
+            break
+        weakest = min(explained.steps, key=lambda step: step.holdout_gain)
+        explained = dropped(explained, weakest)
+        seen = replace(seen, explained=explained, candidates=(*seen.candidates, weakest))
+    return seen
 
 
 def dropped(explained: Explanation, step: Step) -> Explanation:

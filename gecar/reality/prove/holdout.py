@@ -117,8 +117,17 @@ def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None
     for field, k in _POSE.items():
         out[field] = replayer.inputs.pose[:, k] - poses[:, k]
     if run.reads:
-        out["reflection_pct"] = recording.reflection_pct - run.readings(physics)
+        out["reflection_pct"] = _reading_errors(run, physics)
     return out
+
+
+def reading_error(held: Residuals, physics: npt.NDArray[Any]) -> float:
+    """Return how far a robot's readings along the measured paths are off (root mean square) [%]."""
+    return _rms(np.concatenate([_reading_errors(run, physics) for run in held.recordings]))
+
+
+def _reading_errors(run: RecordingResiduals, physics: npt.NDArray[Any]) -> Array:
+    return np.asarray(run.recording.reflection_pct - run.readings(physics))
 
 
 def _floors(held: Residuals) -> dict[str, float]:

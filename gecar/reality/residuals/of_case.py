@@ -111,7 +111,7 @@ class Residuals:
         return np.array([r.nuisances.clock_offset_s for r in self.recordings])
 
     def part(self, numbers: Sequence[int] | npt.NDArray[np.int64]) -> Residuals:
-        """Return these of some of the recordings, by number."""
+        """Return the residuals of some of the recordings, by their numbers."""
         return replace(self, recordings=tuple(self.recordings[k] for k in numbers))
 
     def without_encoders(self) -> Residuals:

@@ -96,12 +96,19 @@ def spread_of_size(folds: npt.NDArray[np.int32], without: Array, with_effect: Ar
     return float(np.sqrt(np.average((shares - mean) ** 2, weights=information)))
 
 
-def _variance_of_sum(index: ResidualIndex, scores: Array) -> tuple[float, float]:
-    """Return the variance of the scores' sum, and how many spans would have it were they independent."""
-    series = []
+def sums_of_spans(index: ResidualIndex, values: Array) -> dict[int, Array]:
+    """Return the sums of values, one of each residual, over each recording's spans of `SPAN_S`, by its number."""
+    sums = dict[int, Array]()
     for number in np.unique(index.recording):
         own = index.recording == number
-        series.append(np.bincount((index.t_s[own] / SPAN_S).astype(int), scores[own]))
+        span = (index.t_s[own] / SPAN_S).astype(int)
+        sums[int(number)] = np.bincount(span, values[own]).astype(float)
+    return sums
+
+
+def _variance_of_sum(index: ResidualIndex, scores: Array) -> tuple[float, float]:
+    """Return the variance of the scores' sum, and how many spans would have it were they independent."""
+    series = list(sums_of_spans(index, scores).values())
     alone = sum(float(s @ s) for s in series)
     variance = alone
     for lag in range(1, max(len(s) for s in series)):
