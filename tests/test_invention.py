@@ -19,7 +19,9 @@ from gecar.errors import InputError
 from gecar.language.grammar import parse_grammar
 from gecar.plots.reality.law import laws_figure
 from gecar.plots.style import is_whole
+from gecar.reality import discovery
 from gecar.reality.discovery import discover
+from gecar.reality.invent.invention import Written
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import simplified
 from gecar.reality.invent.search import Library, fit
@@ -141,6 +143,58 @@ def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
     law = fit(library, library.started(read_sentence(sum_of_three)))
     assert [term.law for term in simplified(library, law)[0].terms] == ["c1 * speed * abs(speed)"]
+
+
+WHEELS_AND_LAG = parse_grammar(
+    """
+    <term> ::= rolling_radius: c * sin(1 * angle) + c * cos(1 * angle); side: each | rolling_radius: c * 1
+             | motor_torque: c * speed | command: c * (store - command); store: command; store_s: 0.1
+    """
+)
+OFF_CENTRE = (
+    frozen(port="rolling_radius", law="c1 * sin(angle)", c1=0.08, side="left"),
+    frozen(port="rolling_radius", law="c1 * cos(angle)", c1=-0.05, side="right"),
+)
+LAG = frozen(port="command", law="c1 * (store - command)", c1=1.0, store="command", store_s=0.07)
+
+
+def test_each_wheel_has_a_law_of_its_own_that_comes_back_once_a_turn():
+    verdict = verdict_on(*OFF_CENTRE, invents=True, language=WHEELS_AND_LAG)
+    found = {law.term.side: law for law in verdict.invented}
+    assert set(found) == {"left", "right"}
+    for side, part, size in (("left", "sin", 0.08), ("right", "cos", -0.05)):
+        term = found[side].term
+        assert f"{part}(k1 * angle)" in term.law
+        assert term.constants["k1"] == 1.0
+        assert found[side].parameters["c1"].value == pytest.approx(size, rel=0.05)
+
+
+def test_commands_that_act_late_are_written_as_such():
+    (law,) = verdict_on(LAG, language=WHEELS_AND_LAG).invented
+    assert law.looks_like == "commands that act late, by about 70 ms"
+    assert law.parameters["c1"].value == pytest.approx(1.0, rel=0.05)
+    assert law.parameters["store_s"].value == pytest.approx(0.07, rel=0.05)
+
+
+@pytest.mark.parametrize("beside", [True, False], ids=["beside", "instead"])
+def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, beside):
+    """The effect goes where the law is found beside it, and where it is found without the effect alone."""
+    if not beside:
+        hidden_by_effects = discovery.invent
+
+        def invent(explained, *args):
+            return (
+                Written(explained, (), ()) if explained.taken.effects else hidden_by_effects(explained, *args)
+            )
+
+        monkeypatch.setattr(discovery, "invent", invent)
+    runs = tuple(recorded(robot_with(dict(LAG)), seed) for seed in range(5))
+    catalogue = [effect for effect in CATALOGUE if effect.id in ("rotor_inertia", "pose_delay")]
+    alone = discover(Case("lag", runs), catalogue=catalogue)
+    assert [found.id for found in alone.effects] == ["rotor_inertia"]
+    verdict = discover(Case("lag", runs), catalogue=catalogue, language=WHEELS_AND_LAG, invents=True)
+    assert verdict.effects == ()
+    assert [law.term.port for law in verdict.invented] == ["command"]
 
 
 def test_a_language_without_a_law_of_one_part_writes_none():
@@ -269,6 +323,11 @@ def test_sums_are_taken_apart_and_put_together():
     )
     assert complexity((law,)) > complexity(read_sentence("motor_torque: c * speed"))
     assert [t.law for t in read_sentence("force_x and force_y: c * x")] == ["c1 * x", "c1 * y"]
+    late = read_sentence("pose_x and pose_y: c * ahead * cos(heading)")
+    assert [t.law for t in late] == ["c1 * ahead * cos(heading)", "c1 * ahead * sin(heading)"]
+    each = read_sentence("rolling_radius: c * sin(1 * angle); side: each")
+    assert [t.side for t in each] == ["left", "right"]
+    assert {t.law for t in each} == {"c1 * sin(k1 * angle)"}
 
 
 @pytest.mark.parametrize(
@@ -281,6 +340,10 @@ def test_sums_are_taken_apart_and_put_together():
           "k1": 1.0, "k2": 1.0}, "a wheel off its centre by 4.0 mm"),
         ({"port": "motor_torque", "law": "c1 * store * command", "c1": -0.1, "store": "draw", "store_s": 15.0},
          "grows over the first 30 s of use and stays: heat"),
+        ({"port": "command", "law": "c1 * (store - command)", "c1": 2.0, "store": "command", "store_s": 0.03},
+         "commands that act late, by about 60 ms"),
+        ({"port": "pose_y", "law": "c1 * ahead * sin(heading)", "c1": -0.04}, "a camera that is late, by about 40 ms"),
+        ({"port": "colour_reading", "law": "c1 * reading * cos(heading)", "c1": 0.1}, "light that comes from one side"),
         ({"port": "yaw_moment", "law": "c1 * heading * y", "c1": 0.1}, "depends on the heading and the place along y"),
     ],
 )  # fmt: skip

@@ -46,7 +46,7 @@ from gecar.reality.selection.acceptance import size_of
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.stepwise import Explanation, concluded
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -69,6 +69,7 @@ from gecar.world.rollout import Outcome, World, simulate
 from gecar.world.terms import Term
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
+INSTEAD = 0.7  # of what effects and laws beside them leave: laws in their place must leave less
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
     fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
-    motion = _with_laws(context, _explain_motion(context, fitted, held), held)
+    motion = _explain_motion(context, fitted, held)
     fitted = _along_paths(
         motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
     )
@@ -259,13 +260,16 @@ class _Stage(Confirmation):
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
-    """Explain how the robot moved; where nothing does, what is left may be at one place of the floor."""
+    """Explain how the robot moved: by effects, with laws for what they leave, or by laws alone.
+
+    Where nothing does, an encoder may err; or what is left may be at one place of the floor.
+    """
     catalogue = observable(context.catalogue, fitted)
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
-    motion = _with_intervals(context, explained_and_confirmed(problem, held))
-    if motion.explained.unexplained:
+    motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
+    if motion.explained.unexplained and not motion.laws:
         motion = _without_encoders(context, fitted, held) or motion
-    if motion.explained.steps:
+    if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
 
@@ -310,11 +314,33 @@ def _explain_sensor(
 
 
 def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:
-    """Return a stage with laws written for what its effects leave, where that is asked for."""
+    """Return a stage with laws written for what its effects leave, where that is asked for.
+
+    Effects may imitate what no list holds: where they leave something material even with laws beside them, laws are
+    written in their place, too, and taken if they leave far less.
+    """
     if context.language is None or not (stage.explained.unexplained or context.invents):
         return stage
-    written = invent(stage.explained, held, context.language, context.seed, context.tell)
+    beside = _written(context, stage, stage.explained, held)
+    if not stage.explained.steps or _left(beside) < 1.0:
+        return beside
+    context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
+    problem = stage.explained.problem
+    bare = concluded(problem, problem.known, (), stage.explained.tried)
+    alone = _written(context, replace(stage, spans={}), bare, held)
+    return alone if _left(alone) < INSTEAD * _left(beside) else beside
+
+
+def _written(context: _Context, stage: _Stage, explained: Explanation, held: Residuals) -> _Stage:
+    """Return a stage with laws on top of an explanation."""
+    assert context.language is not None
+    written = invent(explained, held, context.language, context.seed, context.tell)
     return replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
+
+
+def _left(stage: _Stage) -> float:
+    """Return how many times the size of what is material a stage leaves."""
+    return stage.explained.problem.material.times(stage.explained.left)
 
 
 def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:

@@ -21,6 +21,7 @@ POINT_STEP_M = 0.05
 FARTHEST = 20.0  # coordinates of an inner constant: from a sixth of its size to six times
 PROBE = 0.1  # step of finite differences, in coordinates
 _STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
+_TURN = re.compile(r"\b(?:sin|cos)\(\w+ \* angle\)")
 _USUAL = {variable.id: variable.scale for variable in VARIABLES}
 
 
@@ -113,11 +114,15 @@ def usual_size(term: Term) -> float:
 
 
 def _constants(k: int, term: Term) -> list[Constant]:
-    """Return a term's constants but those that say where a step stands: residuals have no derivative by them."""
+    """Return a term's constants that are free.
+
+    Where a step stands is none, for residuals have no derivative by it; nor how often a thing comes back in a turn of
+    the wheel, for that is a whole number.
+    """
     free, of_law = [], linear(term)
     for number, name in enumerate(term.free):
         value = term.constants[name]
-        if not re.search(rf"\b{name}\b", _STEP.sub("", term.law)):
+        if not re.search(rf"\b{name}\b", _TURN.sub("", _STEP.sub("", term.law))):
             continue
         if name in of_law:
             size = max(abs(value) * INNER_STEP, usual_size(term))

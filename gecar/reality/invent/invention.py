@@ -10,7 +10,7 @@ Then the same again, on top of it, for what is still left. The law becomes a par
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, search
+from gecar.reality.invent.sentences import key
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
 from gecar.reality.prove.holdout import Contender, judge
@@ -40,7 +41,7 @@ from gecar.world.terms import Term
 Array = npt.NDArray[np.float64]
 
 MOST_LAWS = 3
-TRIED = 3  # of the best laws, until one is proved
+TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
 ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
@@ -98,15 +99,10 @@ def invent(
         library = Library(here.problem, here.taken)
         unknown = frozenset[str]() if _placed(problem) else OF_PLACE
         found = search(library, grammar, ports, seed + number, tell, unknown)
-        proved = _first_proved(library, found, largest_gains(library, seed)) if found else None
-        if proved is None:
+        holds = _first_that_holds(written, explained, library, found, held, seed) if found else None
+        if holds is None:
             break
-        law, proof = proved
-        more = _pruned(_added(written, explained, library, law), explained)
-        gain = _gain_set_aside(written.explained, more.explained, held)
-        if gain is None:
-            break
-        told = _told(library, law, _indistinguishable(law, found), proof, gain)
+        more, law, told = holds
         written = replace(more, invented=(*written.invented, *told))
         tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in law.terms)}")
         if not written.explained.unexplained:
@@ -133,13 +129,39 @@ def _placed(problem: Problem) -> bool:
     return any(run.replayer.has_poses or run.nuisances.start is not None for run in runs)
 
 
-def _first_proved(library: Library, found: Sequence[Law], nulls: Array) -> tuple[Law, Proof] | None:
-    """Return the best law that left-out recordings ask for, with its proof; None where the best few are all chance."""
-    for law, gains in (simplified(library, each) for each in found[:TRIED] if each.worth >= PRICE):
+def _first_that_holds(
+    written: Written,
+    first: Explanation,
+    library: Library,
+    found: Sequence[Law],
+    held: Residuals,
+    seed: int,
+) -> tuple[Written, Law, list[Invented]] | None:
+    """Return laws with the best one more that is proved and that recordings set aside ask for; None: there is none.
+
+    With it come that law, and what the verdict says of it.
+    """
+    for law, proof in _proved(library, found, largest_gains(library, seed)):
+        more = _pruned(_added(written, first, library, law), first)
+        gain = _gain_set_aside(written.explained, more.explained, held)
+        if gain is not None:
+            return more, law, _told(library, law, _indistinguishable(law, found), proof, gain)
+    return None
+
+
+def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tuple[Law, Proof]]:
+    """Yield the laws that left-out recordings ask for, of the best few, with their proofs."""
+    tried = set[str]()
+    for each in (law for law in found if law.worth >= PRICE):
+        law, gains = simplified(library, each)
+        if key(law.terms) in tried:
+            continue
+        tried.add(key(law.terms))
         proof = Proof(gains, nulls)
         if law.worth >= PRICE and proof.holds and _spread(library, law) < UNSTEADY:
-            return law, proof
-    return None
+            yield law, proof
+        if len(tried) == TRIED:
+            return
 
 
 def _spread(library: Library, law: Law) -> float:
@@ -215,18 +237,20 @@ def _explained_with(
 def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) -> float | None:
     """Return what a law gains on recordings set aside; None where they do not ask for it, or part as far with it.
 
-    Both over a metre and over whole drives, open loop, as the verdict is judged.
+    They must ask for it beside no other change of the robot, or beside those small ones that either asks for: far from
+    what was fitted these may do more harm than good. Whole drives, open loop, are judged as the verdict is.
     """
     if not held.recordings:
         return 0.0
-    physics = [e.problem.with_small_changes(e.taken) for e in (before, after)]
-    without, having = (held.errors(p) for p in physics)
-    asked = share_asked_for(held.index, without, having)
-    was, now = (before.problem.material.times(before.problem.sizes.of(held).left(p)) for p in physics)
+    plain = [held.errors(e.taken.physics) for e in (before, after)]
+    beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
+    if max(share_asked_for(held.index, *errors).margin for errors in (plain, beside)) <= 0.0:
+        return None
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
     whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
-    better = sum(m.after for m in whole) < sum(m.before for m in whole)
-    return cost(without) - cost(having) if asked.margin > 0.0 and now < HELPS * was and better else None
+    was, now = (sum(max(size - m.floor, 0.0) for m, size in zip(whole, sizes, strict=True))
+                for sizes in ([m.before for m in whole], [m.after for m in whole]))  # fmt: skip
+    return cost(plain[0]) - cost(plain[1]) if now < HELPS * was else None
 
 
 def _of_own_kind(held: Residuals) -> Residuals:

@@ -23,6 +23,11 @@ class _Known(NamedTuple):
 
 
 _TORQUE, _FORCE = ("motor_torque",), ("force_ahead",)
+_RATES = (
+    ("pose_x", "ahead * cos(heading)"),
+    ("pose_y", "ahead * sin(heading)"),
+    ("pose_heading", "turn_rate"),
+)
 _KNOWN = (
     _Known(_TORQUE, r"speed \* abs\(speed\)", "drag growing with the square of the wheel's speed",
            "a push growing with the square of the wheel's speed"),
@@ -64,13 +69,15 @@ _KNOWN = (
            "a colour sensor that reads more than there is"),
     _Known(("colour_reading",), r"time", "light that fades", "light that grows"),
     _Known(("colour_reading",), r"[xy]", "light that falls from one side", "light that falls from one side"),
+    _Known(("colour_reading",), r"reading \* (sin|cos)\(heading\)", "light that comes from one side",
+           "light that comes from one side"),
     _Known(("pose_x", "pose_y"), r"time", "a camera that drifts", "a camera that drifts"),
 )  # fmt: skip
 
 
 def looks_like(term: Term) -> str:
     """Return what a law looks like: its name where it is a known one, or else what it adds and on what that depends."""
-    for say in (_spring, _once_per_turn, _stored, _named):
+    for say in (_spring, _once_per_turn, _late, _stored, _named):
         words = say(term)
         if words:
             return words + _where(term)
@@ -128,6 +135,21 @@ def _once_per_turn(term: Term) -> str:
         term.port, "torque that varies with the shaft's angle"
     )
     return f"{often} per turn: {what}"
+
+
+def _late(term: Term) -> str:
+    """Name what lags: to first order, a thing is late by what is added for every unit of its rate."""
+    found = _single(term)
+    if found is None:
+        return ""
+    shape, value = found
+    if term.port == "command" and shape == "(store - command)" and term.store == "command":
+        late_s, what = value * term.store_s, "commands that act"
+    elif (term.port, shape) in _RATES:
+        late_s, what = -value, "a camera that is"
+    else:
+        return ""
+    return f"{what} {'late' if late_s > 0.0 else 'early'}, by about {1e3 * abs(late_s):.0f} ms"
 
 
 def _stored(term: Term) -> str:

@@ -38,7 +38,7 @@ from gecar.reality.invent.sentences import (
 )
 from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
 from gecar.reality.selection.problem import Problem
-from gecar.world.ports import N_TERMS
+from gecar.world.ports import BY_PORT, N_TERMS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -260,8 +260,7 @@ def search(
         library.look_up([part for laws in some for part in parts_of(laws)])
         for laws in some:
             library.gain(laws)
-    best = max(library.gain(laws) for laws in singles)
-    promising = {t.port for laws in singles for t in laws if library.gain(laws) >= PORTS_KEPT * best}
+    promising = _promising(library, singles)
     kept = sorted(singles, key=lambda laws: _loss(library, laws))[:KEPT_LAWS]
     tell(f"laws evolved at {', '.join(port for port in ports if port in promising)}")
     evolved = _evolved(library, at_ports(there, sorted(promising)), seed, unknown)
@@ -269,6 +268,21 @@ def search(
     ranked = sorted(candidates.values(), key=lambda laws: _loss(library, laws))
     fitted = [fit(library, library.started(laws)) for laws in _spread_over_ports(ranked)]
     return sorted(fitted, key=lambda law: -law.worth)
+
+
+def _promising(library: Library, singles: Sequence[Laws]) -> set[str]:
+    """Return the ports at which a law gains nearly as much as any: of the robot's own, and of those of each sensor.
+
+    What is wrong with a gyro alone, say, hides nothing of how the robot moves.
+    """
+    gains, best = dict[str, float](), dict[str, float]()
+    for laws in singles:
+        for port in {term.port for term in laws}:
+            gains[port] = max(gains.get(port, 0.0), library.gain(laws))
+    for port, gain in gains.items():
+        sensor = BY_PORT[port].sensor
+        best[sensor] = max(best.get(sensor, 0.0), gain)
+    return {port for port, gain in gains.items() if gain >= PORTS_KEPT * best[BY_PORT[port].sensor]}
 
 
 def fit(library: Library, laws: Laws) -> Law:
@@ -286,12 +300,19 @@ def _loss(library: Library, laws: Laws) -> float:
 
 
 def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
-    """Return the first few laws, at most a third of them at one port."""
-    kept: list[Laws] = []
+    """Return the first few laws: at any port at most a third of them, its first laws and the first of the shortest.
+
+    A longer law may do better by its sensitivities alone, where these are not in proportion to its size.
+    """
+    at_port: dict[str, list[Laws]] = {}
     for laws in ranked:
-        if len(kept) < FINALISTS and sum(each[0].port == laws[0].port for each in kept) < FINALISTS // 3:
-            kept.append(laws)
-    return kept
+        at_port.setdefault(laws[0].port, []).append(laws)
+    kept = list[Laws]()
+    for here in at_port.values():
+        first = here[: FINALISTS // 3 - 1]
+        rest = here[len(first) :]
+        kept += [*first, *([min(rest, key=complexity)] if rest else [])]
+    return sorted(kept, key=ranked.index)[:FINALISTS]
 
 
 def _greedy_sums(library: Library, singles: Sequence[Laws]) -> list[Laws]:

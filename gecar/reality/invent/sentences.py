@@ -21,7 +21,9 @@ _SHORT = 30  # choices within which every alternative must come to an end
 _FREE = re.compile(r"\bc\b")
 _LINEAR = re.compile(r"\bc\d+\b")
 _ONE = re.compile(r" \* 1(?![\d.])")
-_AXIS = re.compile(r"\b[xy]\b")
+_EACH = "side: each"
+_AXIS = re.compile(r"\b(?:[xy]|sin\(heading|cos\(heading)\b")
+_OTHER_AXIS = {"x": "y", "y": "x", "cos(heading": "sin(heading", "sin(heading": "cos(heading"}
 _PLUS = re.compile(r" \+ (?=c\d*\b)")
 
 
@@ -47,7 +49,8 @@ def physics_grammar(file: str = SHIPPED) -> Grammar:
 def read_sentence(sentence: str) -> Laws:
     """Read a sentence ``port: formula; store: formula; store_s: seconds; at: x y`` as terms whose constants are 1.
 
-    Two ports, ``force_x and force_y: formula``, make two terms; x and y change places in the second one's formula.
+    Two ports, ``force_x and force_y: formula``, make two terms; in the second one's formula x and y change places, and
+    the sine and the cosine of the heading. So does ``side: each``, one for either wheel.
 
     Raises
     ------
@@ -58,7 +61,10 @@ def read_sentence(sentence: str) -> Laws:
     names, _, law = first.partition(":")
     ports = [name.strip() for name in names.split(" and ")]
     law = _ONE.sub("", law.strip())
-    laws = [law, _AXIS.sub(lambda found: "yx"["xy".index(found[0])], law)][: len(ports)]
+    laws = [law, _AXIS.sub(lambda found: _OTHER_AXIS[found[0]], law)][: len(ports)]
+    if _EACH in others:
+        rest = [other for other in others if other != _EACH]
+        return tuple(_read(ports[0], law, [*rest, f"side: {side}"]) for side in ("left", "right"))
     return tuple(_read(port, each, others) for port, each in zip(ports, laws, strict=True))
 
 
@@ -154,9 +160,14 @@ def _key(part: Term) -> str:
 
 
 def single_laws(grammar: Grammar) -> list[Laws]:
-    """Return all laws of one part at each port that take few choices, each once."""
+    """Return all laws of one part at each port that take few choices, each once; of two parts those of either wheel."""
     read = (read_sentence(sentence) for sentence in sentences(grammar, SINGLE))
-    return list({key(laws): laws for laws in read if all(len(linear(term)) == 1 for term in laws)}.values())
+    return list({key(laws): laws for laws in read if _is_single(laws)}.values())
+
+
+def _is_single(laws: Laws) -> bool:
+    of_each_wheel = len(laws) == 2 and laws[0].side != laws[1].side
+    return all(len(linear(term)) == 1 or of_each_wheel for term in laws)
 
 
 def sentences(grammar: Grammar, most: int) -> Iterator[str]:
