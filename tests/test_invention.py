@@ -344,6 +344,8 @@ def test_sums_are_taken_apart_and_put_together():
          "commands that act late, by about 60 ms"),
         ({"port": "pose_y", "law": "c1 * ahead * sin(heading)", "c1": -0.04}, "a camera that is late, by about 40 ms"),
         ({"port": "colour_reading", "law": "c1 * reading * cos(heading)", "c1": 0.1}, "light that comes from one side"),
+        ({"port": "pose_toward", "law": "c1 * distance * distance ** 2", "c1": 0.1, "at_x": 1.2, "at_y": 0.6},
+         "a camera whose lens bends the picture, about (1.20, 0.60)"),
         ({"port": "yaw_moment", "law": "c1 * heading * y", "c1": 0.1}, "depends on the heading and the place along y"),
     ],
 )  # fmt: skip

@@ -11,7 +11,7 @@ from gecar.errors import InputError
 from gecar.language.program import parse_program
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course.course import load_course
-from gecar.world.ports import PORTS, VARIABLES
+from gecar.world.ports import PORTS, TOWARD_A_POINT, VARIABLES
 from gecar.world.robot import load_robot, read_robot, robot_from, write_robot
 from gecar.world.rollout import World, simulate, simulate_many
 from gecar.world.terms import MOST_CHARACTERS, Term
@@ -128,6 +128,16 @@ def test_an_error_of_the_camera_changes_poses_alone():
     assert np.array_equal(seen.rows, plain.rows)
 
 
+def test_a_lens_moves_poses_along_the_line_to_its_middle():
+    bent = law("pose_toward", "a * distance ** 2", a=-0.2, at_x=0.3, at_y=-0.1)
+    plain, seen = (replayer_of(RECORDING).play(robot.physics) for robot in (NOMINAL, bent))
+    away = plain.poses[:, :2] - (0.3, -0.1)
+    error = seen.poses[:, :2] - plain.poses[:, :2]
+    assert np.allclose(error, 0.2 * np.hypot(*away.T)[:, None] * away)
+    assert np.array_equal(seen.poses[:, 2], plain.poses[:, 2])
+    assert np.array_equal(seen.rows, plain.rows)
+
+
 def test_an_error_of_the_colour_sensor_turns_another_way():
     course = load_course("paper")
     plain, blind = (
@@ -138,7 +148,7 @@ def test_an_error_of_the_colour_sensor_turns_another_way():
 
 @pytest.mark.parametrize("port", PORTS, ids=lambda port: port.id)
 def test_a_term_of_nothing_is_bit_for_bit_no_term(port):
-    point = {"at_x": 1.0, "at_y": 1.0} if port.id == "force_toward" else {}
+    point = {"at_x": 1.0, "at_y": 1.0} if port.id in TOWARD_A_POINT else {}
     robot = law(port.id, "a * time", a=0.0, **point)
     replayer = replayer_of(RECORDING, memory_s=1.0)
     assert np.array_equal(replayer.errors(robot.physics), replayer.errors(NOMINAL.physics), equal_nan=True)
@@ -233,6 +243,7 @@ BAD = [
     ({"store": "speed", "store_s": 0.0}, "found store_s = 0, expected 0.001 to 10000 s"),
     ({"port": "force_x", "side": "left"}, "force_x has no sides"),
     ({"port": "force_toward"}, "found force_toward without at_x and at_y"),
+    ({"port": "pose_toward", "law": "a * distance"}, "found pose_toward without at_x and at_y"),
     ({"port": "pose_x", "law": "a * x", "store": "x"}, "found a store at pose_x"),
     ({"side": "top"}, "'both', 'left' or 'right'"),
 ]  # fmt: skip

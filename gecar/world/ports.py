@@ -140,8 +140,12 @@ PORTS: tuple[Port, ...] = (
     Port("pose_heading", "rad", "an error of the camera's heading", False, 0.05, _SEEN, "camera"),
     Port("colour_reading", "%", "an error of the colour sensor", False, 10.0,
          ("time", "x", "y", "heading", "reading"), "colour"),
+    Port("pose_toward", "m", "an error of the camera toward a point on the floor", False, 0.05, (*_SEEN, "distance"),
+         "camera"),
 )  # fmt: skip
 PORT_NUMBER = {port.id: number for number, port in enumerate(PORTS)}
+TOWARD_A_POINT = ("force_toward", "pose_toward")
+"""Ports of laws that need a point on the floor."""
 BY_PORT = {port.id: port for port in PORTS}
 
 # Tokens: a constant's number, then variables, then operators.

@@ -17,7 +17,7 @@ A robot file holds them as ``[[term]]`` tables::
     a = 0.05
 
 A law is read by Python's own parser and turned into postfix tokens; it is never run as Python. ``at_x`` and ``at_y``
-are the point that ``force_toward`` pulls to, and that ``distance`` is measured from.
+are the point that ``force_toward`` and ``pose_toward`` pull to, and that ``distance`` is measured from.
 """
 
 from __future__ import annotations
@@ -61,6 +61,7 @@ from gecar.world.ports import (
     STORE_LENGTH,
     STORE_S,
     TERM_WIDTH,
+    TOWARD_A_POINT,
     VARIABLE,
     Port,
 )
@@ -250,8 +251,8 @@ class Term(BaseModel):
                 raise ValueError(f"found {name} = {value!r}, expected a finite number")
         if len(self.free) > MOST_CONSTANTS:
             raise ValueError(f"found {len(self.free)} constants, expected at most {MOST_CONSTANTS}")
-        if self.port == "force_toward" and set(POINT) - set(self.constants):
-            raise ValueError("found force_toward without at_x and at_y, expected both [m]")
+        if self.port in TOWARD_A_POINT and set(POINT) - set(self.constants):
+            raise ValueError(f"found {self.port} without at_x and at_y, expected both [m]")
 
     def _check_store(self, port: Port) -> None:
         if self.store and port.reads:

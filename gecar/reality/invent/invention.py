@@ -35,7 +35,7 @@ from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CLOSE, LEFT_SHARE, MEASURED, PRICE, UNSTEADY
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
-from gecar.world.ports import N_TERMS, PORTS
+from gecar.world.ports import N_TERMS, PORTS, TOWARD_A_POINT
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
 ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
-ON_FLOOR = frozenset(("force_x", "force_y", "force_toward"))  # ports that have the floor's axes
+ON_FLOOR = frozenset(("force_x", "force_y", *TOWARD_A_POINT))  # ports that have the floor's axes
 
 
 @dataclass(frozen=True)

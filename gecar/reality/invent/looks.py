@@ -77,7 +77,7 @@ _KNOWN = (
 
 def looks_like(term: Term) -> str:
     """Return what a law looks like: its name where it is a known one, or else what it adds and on what that depends."""
-    for say in (_spring, _once_per_turn, _late, _stored, _named):
+    for say in (_spring, _lens, _once_per_turn, _late, _stored, _named):
         words = say(term)
         if words:
             return words + _where(term)
@@ -117,6 +117,16 @@ def _spring(term: Term) -> str:
             f"a {'pull toward' if pulls else 'push away from'} {at} that is felt near it: a magnet, or a bump"
         )
     return f"a {'pull toward' if pulls else 'push away from'} {at}"
+
+
+def _lens(term: Term) -> str:
+    """Name a radial error, as a lens has: powers of the distance (Brown, Photogramm. Eng. 32 (1966) 444)."""
+    if term.port != "pose_toward":
+        return ""
+    at, found = f"({term.constants['at_x']:.2f}, {term.constants['at_y']:.2f})", _single(term)
+    if found and found[0] == "distance":
+        return f"a camera whose picture is too {'small' if found[1] > 0.0 else 'large'}, about {at}"
+    return f"a camera whose lens bends the picture, about {at}"
 
 
 def _once_per_turn(term: Term) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.replay.kernel import HEADING, X, Y
-from gecar.reality.replay.replayer import Replayer
+from gecar.reality.replay.replayer import Prediction, Replayer
 
 Array = npt.NDArray[np.float64]
 # Over this the difference between camera and replay is averaged: long against a frame, short against an error's growth.
@@ -19,17 +19,31 @@ def measured_path(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
     """Return the axle centre's pose at every row, shape (rows, 3) [m, m, rad], on the brick's clock.
 
     A following replay gives the shape between frames; what the camera says besides is smoothed forwards and backwards,
-    so that the path neither lags nor carries the camera's noise.
+    so that the path neither lags nor carries the camera's noise, nor the errors that the robot's laws give it.
     """
-    rows = replayer.play(physics).rows
-    path: Array = rows[:, [X, Y, HEADING]].copy()
-    late = float(physics["pose_delay"][0]) + replayer.clock_offset_s
-    t = replayer.inputs.pose_t - late
+    played = replayer.play(physics)
+    path: Array = played.rows[:, [X, Y, HEADING]].copy()
+    t = replayer.inputs.pose_t - late_s(replayer, physics)
+    errors = camera_errors(replayer, physics, played)
     for k in range(3):
         seen = ~np.isnan(replayer.inputs.pose[:, k])
-        replayed = np.interp(t[seen], replayer.t, path[:, k])
+        replayed = np.interp(t[seen], replayer.t, path[:, k]) + errors[seen, k]
         path[:, k] += _smoothed(t[seen], replayer.inputs.pose[seen, k] - replayed, replayer.t)
     return path
+
+
+def camera_errors(replayer: Replayer, physics: npt.NDArray[Any], played: Prediction) -> Array:
+    """Return what a robot's laws add to the poses that the camera sees, shape (poses, 3) [m, m, rad]."""
+    if physics["n_terms"][0] == 0.0:
+        return np.zeros((len(replayer.inputs.pose_t), 3))
+    t = replayer.inputs.pose_t - late_s(replayer, physics)
+    path = played.rows[:, [X, Y, HEADING]]
+    return played.poses - np.stack([np.interp(t, replayer.t, path[:, k]) for k in range(3)], axis=1)
+
+
+def late_s(replayer: Replayer, physics: npt.NDArray[Any]) -> float:
+    """Return how late the camera's poses are on the brick's clock [s]."""
+    return float(physics["pose_delay"][0]) + replayer.clock_offset_s
 
 
 def _smoothed(t: Array, values: Array, at: Array) -> Array:

@@ -14,7 +14,7 @@ from gecar.reality.noise.sensor_noise import PATH_CAUTION
 from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.replay.kernel import HEADING, X, Y
 from gecar.reality.replay.odometry import smoothed_rows
-from gecar.reality.replay.smoothed_path import measured_path
+from gecar.reality.replay.smoothed_path import camera_errors, measured_path
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 
@@ -143,9 +143,16 @@ def _replayed(run: RecordingResiduals, physics: Physics) -> Array:
 
 
 def _seen(run: RecordingResiduals, rows: Array, physics: Physics) -> Array:
-    """Return the path of the axle's centre as a late camera reports it, shape (rows, 3)."""
+    """Return the path of the axle's centre as a late camera reports it, with errors it has by law, shape (rows, 3)."""
     late = run.replayer.t - float(physics["pose_delay"][0])
-    return np.stack([np.interp(late, run.replayer.t, rows[:, k]) for k in PLACE], axis=1)
+    path = np.stack([np.interp(late, run.replayer.t, rows[:, k]) for k in PLACE], axis=1)
+    if physics["n_terms"][0] > 0.0 and run.replayer.has_poses:
+        replayer = run.replayer.open_loop()
+        errors = camera_errors(replayer, physics, replayer.play(physics))
+        path += np.stack(
+            [np.interp(replayer.t, replayer.inputs.pose_t, errors[:, k]) for k in range(3)], axis=1
+        )
+    return path
 
 
 def _reckoned(run: RecordingResiduals, physics: Physics, angles: Array) -> Array:

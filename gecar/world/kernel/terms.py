@@ -61,7 +61,8 @@ assert VARIABLE["draw"] == _DRAW
 _PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_LOAD, _PORT_GRIP = range(7)
 _PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
 PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(13, 19)
-assert PORT_NUMBER["colour_reading"] == _PORT_COLOUR
+_PORT_POSE_TOWARD = 19
+assert PORT_NUMBER["pose_toward"] == _PORT_POSE_TOWARD
 
 _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
 _PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
@@ -210,12 +211,9 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
         for hand in range(2):
             v.of[hand, _STORE] = stores.of[hand, k]
         if port == _PORT_TOWARD:
-            dx, dy = laws.terms[k, AT_X] - v.of[0, _X], laws.terms[k, AT_Y] - v.of[0, _Y]
-            distance = math.sqrt(dx * dx + dy * dy)
-            v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = distance
-            pull = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2) / max(distance, 1e-6)
-            asked.force_x += pull * dx
-            asked.force_y += pull * dy
+            force_x, force_y = _toward(laws, k, v)
+            asked.force_x += force_x
+            asked.force_y += force_y
         elif port in (
             _PORT_SUPPLY,
             _PORT_FORCE_AHEAD,
@@ -332,4 +330,16 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
         side = int(laws.terms[k, SIDE])
         if int(laws.terms[k, PORT]) == port and (not of_wheel or side in (BOTH, hand)):
             total += _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand if of_wheel else 2)
+        elif port in (PORT_POSE_X, PORT_POSE_Y) and int(laws.terms[k, PORT]) == _PORT_POSE_TOWARD:
+            total += _toward(laws, k, v)[port - PORT_POSE_X]
     return total
+
+
+@kernel
+def _toward(laws: Any, k: int, v: Any) -> tuple[float, float]:
+    """Return along x and y what a law gives toward its point."""
+    dx, dy = laws.terms[k, AT_X] - v.of[0, _X], laws.terms[k, AT_Y] - v.of[0, _Y]
+    distance = math.sqrt(dx * dx + dy * dy)
+    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = distance
+    pull = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2) / max(distance, 1e-6)
+    return pull * dx, pull * dy
