@@ -30,7 +30,7 @@ from gecar.reality.verdict import Interval, Judgement, Place, Verdict
 from gecar.report.units import amount, quantities
 from gecar.report.verdict import FAILS, sentences, words
 from gecar.report.verdict_page import article, first_screen
-from gecar.world.effects import CATALOGUE
+from gecar.world.effects import BY_ID, CATALOGUE
 
 CASES = {
     "late": ("actuation_delay", "time_s", 0.03, "floor"),
@@ -199,6 +199,20 @@ def test_every_effect_has_units_people_use(effect) -> None:  # type: ignore[no-u
 def test_a_scale_is_said_as_what_it_scales() -> None:
     (battery,) = quantities("supply_voltage", {"scale": Interval(0.946, 0.94, 0.952, "-")}, EV3)
     assert str(battery) == "battery 8.67 → 8.20 V (8.15 to 8.25)"
+
+
+@pytest.mark.parametrize(
+    ("effect", "found", "words"),
+    [
+        ("tyre_friction", Interval(1.7, 1.1, 2.0, "-"), "grip 0.90 → 1.70 (1.10 or more)"),
+        ("tyre_friction", Interval(0.05, 0.03, 0.1, "-"), "grip 0.900 → 0.050 (0.100 or less)"),
+        ("com_offset", Interval(0.0, -0.03, 0.0, "m"), "to"),
+    ],
+)
+def test_an_interval_that_ends_where_the_search_does_is_open(effect, found, words) -> None:  # type: ignore[no-untyped-def]
+    (parameter, *_) = BY_ID[effect].parameters
+    (told, *_) = quantities(effect, {parameter.label: found}, EV3)
+    assert words in str(told)
 
 
 def test_what_was_found_is_drawn_where_it_is() -> None:

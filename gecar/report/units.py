@@ -109,7 +109,10 @@ _SHAPES = ("ripple_phase", "ripple_lead")  # say nothing to anybody
 
 
 class Quantity(NamedTuple):
-    """A parameter that was found: what, before and now, 95 % interval, unit; before is None where there was none."""
+    """A parameter that was found: what, before and now, 95 % interval, unit; before is None where there was none.
+
+    ``or_less`` and ``or_more`` say that an end is only as far as was searched.
+    """
 
     what: str
     before: float | None
@@ -117,6 +120,8 @@ class Quantity(NamedTuple):
     low: float
     high: float
     unit: str
+    or_less: bool = False
+    or_more: bool = False
 
     def __str__(self) -> str:
         numbers = [self.now, self.low, self.high, *(() if self.before is None else (self.before,))]
@@ -124,7 +129,10 @@ class Quantity(NamedTuple):
         unit = f" {self.unit}" if self.unit else ""
         now, low, high = (f"{n:.{places}f}" for n in (self.now, self.low, self.high))
         was = "" if self.before is None else f"{self.before:.{places}f} → "
-        return f"{self.what} {was}{now}{unit} ({low} to {high})"
+        span = f"{low} to {high}"
+        if self.or_less != self.or_more:
+            span = f"{high} or less" if self.or_less else f"{low} or more"
+        return f"{self.what} {was}{now}{unit} ({span})"
 
 
 def quantities(effect_id: str, parameters: Mapping[str, Interval], robot: Robot) -> list[Quantity]:
@@ -147,17 +155,22 @@ def quantities(effect_id: str, parameters: Mapping[str, Interval], robot: Robot)
             continue
         found = parameters[parameter.label]
         reading = _scaled(_READINGS[parameter.field], found.value * parameter.si, constants)
-        now, low, high = (
-            reading.of(v * parameter.si, constants) for v in (found.value, found.low, found.high)
+        now = reading.of(found.value * parameter.si, constants)
+        ends = ((found.low, parameter.low), (found.high, parameter.high))
+        (low, or_less), (high, or_more) = sorted(
+            (reading.of(end * parameter.si, constants), _only_searched(end, bound, parameter))
+            for end, bound in ends
         )
         before = reading.of(constants[parameter.field], constants)
         known = parameter.worthwhile > 0.0 and math.isfinite(before) and before != 0.0
-        out.append(
-            Quantity(
-                reading.what, before if known else None, now, min(low, high), max(low, high), reading.unit
-            )
-        )
+        was = before if known else None
+        out.append(Quantity(reading.what, was, now, low, high, reading.unit, or_less, or_more))
     return out
+
+
+def _only_searched(end: float, bound: float, parameter: Parameter) -> bool:
+    """Whether an interval ends where the search does, and neither at nothing nor where the effect vanishes."""
+    return bound not in (0.0, parameter.neutral) and math.isclose(end, bound, rel_tol=1e-6)
 
 
 def _scaled(reading: Reading, value: float, constants: Mapping[str, float]) -> Reading:

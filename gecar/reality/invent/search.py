@@ -355,12 +355,13 @@ class _Evolved(EvolvedProblem[Laws]):
         self._unknown = unknown
 
     def read(self, derivation: Derivation) -> Laws | None:
-        """Return the laws that were derived; None where the sentence is none."""
+        """Return the laws that were derived; None where the sentence is none, or says a thing twice."""
         try:
             laws = read_sentence(derivation.text)
         except ValueError:
             return None
-        return None if _variables(laws) & self._unknown else laws
+        parts = [key((part,)) for part in parts_of(laws)]
+        return None if _variables(laws) & self._unknown or len(set(parts)) < len(parts) else laws
 
     def meaning(self, program: Laws, derivation: Derivation) -> bytes:  # noqa: ARG002
         """Return the laws as bytes."""
