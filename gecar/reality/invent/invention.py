@@ -244,13 +244,15 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
         return 0.0
     plain = [held.errors(e.taken.physics) for e in (before, after)]
     beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
-    if max(share_asked_for(held.index, *errors).margin for errors in (plain, beside)) <= 0.0:
+    without, having = max((plain, beside), key=lambda errors: share_asked_for(held.index, *errors).margin)
+    gain = cost(without) - cost(having)
+    if gain <= 0.0 or share_asked_for(held.index, without, having).margin <= 0.0:
         return None
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
     whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
     was, now = (sum(max(size - m.floor, 0.0) for m, size in zip(whole, sizes, strict=True))
                 for sizes in ([m.before for m in whole], [m.after for m in whole]))  # fmt: skip
-    return cost(plain[0]) - cost(plain[1]) if now < HELPS * was else None
+    return gain if now < HELPS * was else None
 
 
 def _of_own_kind(held: Residuals) -> Residuals:

@@ -57,7 +57,8 @@ EVOLUTION = EvolutionSettings(
     population=80, generations=12, codons=40, elites=4, initialisation="ptc2", initial_expansions=12,
     crossover="subtree", crossover_rate=0.7, mutation="one_used_codon", duplicates="run", tournament=4,
 )  # fmt: skip
-FINALISTS = 9
+FINALISTS = 12
+AT_BEST = 5  # laws of one part that are fitted in full at the best law's port
 ROUNDS = 8
 OWN_SHARE = 1e-4  # of a column's square that the model's own parameters do not hold; less is none of its own
 
@@ -300,18 +301,18 @@ def _loss(library: Library, laws: Laws) -> float:
 
 
 def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
-    """Return the first few laws: at any port at most a third of them, its first laws and the first of the shortest.
+    """Return the first few laws; at any port its first, the first of one part (several at the best port), the shortest.
 
-    A longer law may do better by its sensitivities alone, where these are not in proportion to its size.
+    Sensitivities flatter long laws and steep ones: where these are not in proportion to their size.
     """
     at_port: dict[str, list[Laws]] = {}
     for laws in ranked:
         at_port.setdefault(laws[0].port, []).append(laws)
     kept = list[Laws]()
-    for here in at_port.values():
-        first = here[: FINALISTS // 3 - 1]
-        rest = here[len(first) :]
-        kept += [*first, *([min(rest, key=complexity)] if rest else [])]
+    for number, here in enumerate(at_port.values()):
+        plain = [laws for laws in here if len(parts_of(laws)) == len(laws)]
+        chosen = [here[0], *plain[: AT_BEST if number == 0 else 1], min(here, key=complexity)]
+        kept += [laws for laws in here if laws in chosen]
     return sorted(kept, key=ranked.index)[:FINALISTS]
 
 
