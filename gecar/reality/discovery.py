@@ -260,9 +260,9 @@ class _Stage(Confirmation):
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
-    """Explain how the robot moved: by effects, with laws for what they leave, or by laws alone.
+    """Explain how the robot moved: by effects, by effects and laws, or by laws alone.
 
-    Where nothing does, an encoder may err; or what is left may be at one place of the floor.
+    If none of these does, the encoders may be wrong, or what is left may be at one place on the floor.
     """
     catalogue = observable(context.catalogue, fitted)
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
@@ -314,32 +314,33 @@ def _explain_sensor(
 
 
 def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:
-    """Return a stage with laws written for what its effects leave, where that is asked for.
+    """Add laws that explain what a stage's effects do not, where laws are wanted.
 
     Effects may imitate what no list holds: where they leave something material even with laws beside them, laws are
     written in their place, too, and taken if they leave far less.
     """
     if context.language is None or not (stage.explained.unexplained or context.invents):
         return stage
-    beside = _written(context, stage, stage.explained, held)
+    beside = _with_laws_on(context, context.language, stage, stage.explained, held)
     if not stage.explained.steps or _left(beside) < 1.0:
         return beside
     context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
     problem = stage.explained.problem
     bare = concluded(problem, problem.known, (), stage.explained.tried)
-    alone = _written(context, replace(stage, spans={}), bare, held)
+    alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare, held)
     return alone if _left(alone) < INSTEAD * _left(beside) else beside
 
 
-def _written(context: _Context, stage: _Stage, explained: Explanation, held: Residuals) -> _Stage:
-    """Return a stage with laws on top of an explanation."""
-    assert context.language is not None
-    written = invent(explained, held, context.language, context.seed, context.tell)
+def _with_laws_on(
+    context: _Context, language: Grammar, stage: _Stage, explained: Explanation, held: Residuals
+) -> _Stage:
+    """Return a stage with this explanation in place of its own, and laws added to it."""
+    written = invent(explained, held, language, context.seed, context.tell)
     return replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
 
 
 def _left(stage: _Stage) -> float:
-    """Return how many times the size of what is material a stage leaves."""
+    """Return the size of what a stage leaves unexplained, as a multiple of the smallest material size."""
     return stage.explained.problem.material.times(stage.explained.left)
 
 

@@ -114,10 +114,10 @@ def usual_size(term: Term) -> float:
 
 
 def _constants(k: int, term: Term) -> list[Constant]:
-    """Return a term's constants that are free.
+    """Return the constants of a term that a fit may change.
 
-    Where a step stands is none, for residuals have no derivative by it; nor how often a thing comes back in a turn of
-    the wheel, for that is a whole number.
+    It may not change where a step stands, because residuals have no derivative by it, nor how often something repeats
+    in a turn of the wheel, because that is a whole number.
     """
     free, of_law = [], linear(term)
     for number, name in enumerate(term.free):

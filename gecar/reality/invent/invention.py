@@ -137,9 +137,9 @@ def _first_that_holds(
     held: Residuals,
     seed: int,
 ) -> tuple[Written, Law, list[Invented]] | None:
-    """Return laws with the best one more that is proved and that recordings set aside ask for; None: there is none.
+    """Add the best law that is proved and that the held-out recordings confirm; None if there is none.
 
-    With it come that law, and what the verdict says of it.
+    Returned are all laws with the new one, the new one, and what the verdict says of it.
     """
     for law, proof in _proved(library, found, largest_gains(library, seed)):
         more = _pruned(_added(written, first, library, law), first)
@@ -150,7 +150,7 @@ def _first_that_holds(
 
 
 def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tuple[Law, Proof]]:
-    """Yield the laws that left-out recordings ask for, of the best few, with their proofs."""
+    """Yield those of the best few laws that cross-validation confirms, with their proofs."""
     tried = set[str]()
     for each in (law for law in found if law.worth >= PRICE):
         law, gains = simplified(library, each)
@@ -244,14 +244,15 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
         return 0.0
     plain = [held.errors(e.taken.physics) for e in (before, after)]
     beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
-    without, having = max((plain, beside), key=lambda errors: share_asked_for(held.index, *errors).margin)
+    shares = [(share_asked_for(held.index, *errors).margin, errors) for errors in (plain, beside)]
+    margin, (without, having) = max(shares, key=lambda share: share[0])
     gain = cost(without) - cost(having)
-    if gain <= 0.0 or share_asked_for(held.index, without, having).margin <= 0.0:
+    if gain <= 0.0 or margin <= 0.0:
         return None
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
     whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
-    was, now = (sum(max(size - m.floor, 0.0) for m, size in zip(whole, sizes, strict=True))
-                for sizes in ([m.before for m in whole], [m.after for m in whole]))  # fmt: skip
+    was = sum(max(misfit.before - misfit.floor, 0.0) for misfit in whole)
+    now = sum(max(misfit.after - misfit.floor, 0.0) for misfit in whole)
     return gain if now < HELPS * was else None
 
 

@@ -120,7 +120,7 @@ def _spring(term: Term) -> str:
 
 
 def _lens(term: Term) -> str:
-    """Name a radial error, as a lens has: powers of the distance (Brown, Photogramm. Eng. 32 (1966) 444)."""
+    """Name an error of the camera along the line to a point: a lens (Brown, Photogramm. Eng. 32 (1966) 444)."""
     if term.port != "pose_toward":
         return ""
     at, found = f"({term.constants['at_x']:.2f}, {term.constants['at_y']:.2f})", _single(term)
@@ -148,7 +148,7 @@ def _once_per_turn(term: Term) -> str:
 
 
 def _late(term: Term) -> str:
-    """Name what lags: to first order, a thing is late by what is added for every unit of its rate."""
+    """Name a delay: to first order, what is late is off by its rate of change times the delay."""
     found = _single(term)
     if found is None:
         return ""

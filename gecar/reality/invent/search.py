@@ -11,6 +11,7 @@ Sources: Grammatical Evolution, O'Neill and Ryan, IEEE T-EC 5 (2001) 349; descri
 from __future__ import annotations
 
 import itertools
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -272,18 +273,17 @@ def search(
 
 
 def _promising(library: Library, singles: Sequence[Laws]) -> set[str]:
-    """Return the ports at which a law gains nearly as much as any: of the robot's own, and of those of each sensor.
+    """Return the ports whose best law gains nearly as much as the best at any port of the same sensor, or of none.
 
-    What is wrong with a gyro alone, say, hides nothing of how the robot moves.
+    Each sensor's ports are apart: a wrong gyro, say, must not hide what is wrong with the motion.
     """
-    gains, best = dict[str, float](), dict[str, float]()
+    best_at, best_of = defaultdict[str, float](float), defaultdict[str, float](float)
     for laws in singles:
-        for port in {term.port for term in laws}:
-            gains[port] = max(gains.get(port, 0.0), library.gain(laws))
-    for port, gain in gains.items():
-        sensor = BY_PORT[port].sensor
-        best[sensor] = max(best.get(sensor, 0.0), gain)
-    return {port for port, gain in gains.items() if gain >= PORTS_KEPT * best[BY_PORT[port].sensor]}
+        gain = library.gain(laws)
+        for port in (term.port for term in laws):
+            best_at[port] = max(best_at[port], gain)
+            best_of[BY_PORT[port].sensor] = max(best_of[BY_PORT[port].sensor], gain)
+    return {port for port, gain in best_at.items() if gain >= PORTS_KEPT * best_of[BY_PORT[port].sensor]}
 
 
 def fit(library: Library, laws: Laws) -> Law:
@@ -301,9 +301,10 @@ def _loss(library: Library, laws: Laws) -> float:
 
 
 def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
-    """Return the first few laws; at any port its first, the first of one part (several at the best port), the shortest.
+    """Return the laws to fit in full, best first.
 
-    Sensitivities flatter long laws and steep ones: where these are not in proportion to their size.
+    At each port these are the best law, the best of one part (several at the best port), and the best of the shortest:
+    sensitivities overrate long and steep laws, whose effect is not in proportion to their size.
     """
     at_port: dict[str, list[Laws]] = {}
     for laws in ranked:
@@ -356,7 +357,7 @@ class _Evolved(EvolvedProblem[Laws]):
         self._unknown = unknown
 
     def read(self, derivation: Derivation) -> Laws | None:
-        """Return the laws that were derived; None where the sentence is none, or says a thing twice."""
+        """Return the laws of a sentence; None if it is not a law, or repeats a part."""
         try:
             laws = read_sentence(derivation.text)
         except ValueError:

@@ -160,7 +160,7 @@ def _key(part: Term) -> str:
 
 
 def single_laws(grammar: Grammar) -> list[Laws]:
-    """Return all laws of one part at each port that take few choices, each once; of two parts those of either wheel."""
+    """Return all short laws of one part, each once; a law for each wheel may have two parts on either."""
     read = (read_sentence(sentence) for sentence in sentences(grammar, SINGLE))
     return list({key(laws): laws for laws in read if _is_single(laws)}.values())
 

@@ -50,7 +50,7 @@ class Confirmation:
 
 
 def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
-    """Explain recordings and confirm the effects; where some are refused, explain once more without those.
+    """Explain recordings and confirm the effects; if any are refused, explain again without them.
 
     What imitates takes the place of a cause that gains less, and leaves nothing when it is dropped.
     """
@@ -128,14 +128,14 @@ def _judged(
 def _asked_for(
     step: Step, index: ResidualIndex, without: Sequence[Array], with_all: Array
 ) -> tuple[Step, Share]:
-    """Return a step with what it gains, and the share of it that is asked for, by residuals without it and with it."""
+    """Return a step with its gain, and the share of its size that residuals without it and with it ask for."""
     shares = [share_asked_for(index, errors, with_all) for errors in without]
     least = UNSEEN if shares[0] is UNSEEN else min(shares, key=lambda share: share.margin)
     return replace(step, holdout_gain=cost(without[0]) - cost(with_all)), least
 
 
 def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step, Share]:
-    """Return the same of the recordings fitted on that show it, each left out in turn with everything fitted anew.
+    """Judge an effect on the fitted recordings that show it: each is left out in turn, and everything fitted again.
 
     Two or more must show it; without the only one nothing is known of it: `UNSEEN`.
     """
@@ -160,13 +160,13 @@ def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step,
 
 
 def _shown(explained: Explanation, without: Model) -> Array:
-    """Return by how much an effect changes each residual fitted on, squared, shape (n,)."""
+    """Return the square of the change that an effect makes to each fitted residual, shape (n,)."""
     errors = explained.problem.residuals.errors
     return np.asarray((errors(without.physics) - errors(explained.taken.physics)) ** 2)
 
 
 def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
-    """Whether an effect shows only once in the recordings fitted on, and a row of the log is missing there.
+    """Whether an effect shows only once in the fitted recordings, at a moment where the log misses a row.
 
     Then what looks like a place may be a command that came earlier or later than the log says.
     """
@@ -199,7 +199,7 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
 
 
 def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
-    """Drop, one by one, effects of the colour sensor while held-out readings as a whole are worse with them.
+    """Drop effects of the colour sensor, one by one, as long as they make the held-out readings as a whole worse.
 
     What is confirmed beside small changes of line and mount, which no robot file has, may need them.
     """

@@ -122,7 +122,7 @@ def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None
 
 
 def reading_error(held: Residuals, physics: npt.NDArray[Any]) -> float:
-    """Return how far a robot's readings along the measured paths are off (root mean square) [%]."""
+    """Return the root-mean-square error of a robot's simulated readings along the measured paths [%]."""
     return _rms(np.concatenate([_reading_errors(run, physics) for run in held.recordings]))
 
 

@@ -14,6 +14,7 @@ from gecar.reality.noise.sensor_noise import PATH_CAUTION
 from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.replay.kernel import HEADING, X, Y
 from gecar.reality.replay.odometry import smoothed_rows
+from gecar.reality.replay.replayer import Prediction
 from gecar.reality.replay.smoothed_path import camera_errors, measured_path
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
@@ -86,15 +87,15 @@ class Sizes:
 
 def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
     track = float(one["track_width"][0])
-    rows, other_rows = _replayed(run, one), _replayed(run, other)
-    wheels, other_wheels = _reckoned(run, one, rows), _reckoned(run, other, other_rows)
-    poses = _parting(_seen(run, rows, one), _seen(run, other_rows, other), wheels, track, QUIET)
+    played, other_played = _replayed(run, one), _replayed(run, other)
+    wheels, other_wheels = _reckoned(run, one, played.rows), _reckoned(run, other, other_played.rows)
+    poses = _parting(_seen(run, played, one), _seen(run, other_played, other), wheels, track, QUIET)
     return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
 
 
 def _left(run: RecordingResiduals, physics: Physics) -> Size:
     out, track = Size(), float(physics["track_width"][0])
-    rows = _replayed(run, physics)
+    rows = _replayed(run, physics).rows
     path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
     if run.replayer.has_poses:
         seen = measured_path(run.replayer, physics)
@@ -112,7 +113,7 @@ def _left(run: RecordingResiduals, physics: Physics) -> Size:
 
 def _left_about(run: RecordingResiduals, physics: Physics, spot: tuple[float, float]) -> Size | None:
     """Return how far a robot parts from the poses seen, over windows of a metre that pass a spot; None: none does."""
-    rows = _replayed(run, physics)
+    rows = _replayed(run, physics).rows
     seen, wheels = measured_path(run.replayer, physics), _reckoned(run, physics, rows)
     near = np.hypot(seen[:, 0] - spot[0], seen[:, 1] - spot[1]) < SPOT_M
     passed = np.r_[0, np.cumsum(near)]
@@ -137,21 +138,19 @@ def _reading_left(run: RecordingResiduals, physics: Physics) -> Size:
     return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, PATH_KNOWN) ** 2))
 
 
-def _replayed(run: RecordingResiduals, physics: Physics) -> Array:
-    """Return what an open-loop replay predicts, one row for each of the recording's."""
-    return run.replayer.open_loop().play(physics).rows
+def _replayed(run: RecordingResiduals, physics: Physics) -> Prediction:
+    """Return what an open-loop replay predicts."""
+    return run.replayer.open_loop().play(physics)
 
 
-def _seen(run: RecordingResiduals, rows: Array, physics: Physics) -> Array:
-    """Return the path of the axle's centre as a late camera reports it, with errors it has by law, shape (rows, 3)."""
-    late = run.replayer.t - float(physics["pose_delay"][0])
-    path = np.stack([np.interp(late, run.replayer.t, rows[:, k]) for k in PLACE], axis=1)
-    if physics["n_terms"][0] > 0.0 and run.replayer.has_poses:
-        replayer = run.replayer.open_loop()
-        errors = camera_errors(replayer, physics, replayer.play(physics))
-        path += np.stack(
-            [np.interp(replayer.t, replayer.inputs.pose_t, errors[:, k]) for k in range(3)], axis=1
-        )
+def _seen(run: RecordingResiduals, played: Prediction, physics: Physics) -> Array:
+    """Return a replay's path of the axle's centre as the camera reports it, late and with errors, shape (rows, 3)."""
+    replayer = run.replayer
+    late = replayer.t - float(physics["pose_delay"][0])
+    path = np.stack([np.interp(late, replayer.t, played.rows[:, k]) for k in PLACE], axis=1)
+    if replayer.has_poses:
+        errors = camera_errors(replayer, physics, played)
+        path += np.stack([np.interp(replayer.t, replayer.inputs.pose_t, each) for each in errors.T], axis=1)
     return path
 
 
