@@ -255,3 +255,15 @@ def test_mixed_case_is_right_when_the_effect_is_named_and_the_rest_is_not():
     assert judged.right
     assert judged.material
     assert not judge(label, {**said, "verdict": "missing"}, seen).right
+    assert judge(label, {**said, "verdict": "missing_and_invented"}, seen).right
+
+
+def test_outside_physics_that_gets_a_law_is_no_wrong_name():
+    label = {"case": "x", "kind": "outside", "runs": [], "effects": [], "outside": {"id": "o"}}
+    label |= {"world": "continuous", "size": {"o": {"mm_1m": 12.0, "deg_1m": 0.0, "reading_pct": 0.0}}}
+    seen = {"d_prime": {"o": 90.0}, "groups": {}, "timeline": []}
+    words = {"invented": True, "unexplained": True, "nothing": False, "missing": False}
+    for word, right in words.items():
+        named = [{"id": "p"}] if word == "missing" else []
+        assert judge(label, {"verdict": word, "effects": named}, seen).right == right
+    assert judge(label, {"verdict": "nothing", "effects": []}, seen).all_material

@@ -1,4 +1,4 @@
-"""The command line: ``python -m benchmarks.concealed draw | plan | exam | run | score | drive | practice``."""
+"""The command line: ``python -m benchmarks.concealed draw | plan | exam | run | score | best | drive | practice``."""
 
 from __future__ import annotations
 
@@ -106,6 +106,8 @@ def _parser() -> argparse.ArgumentParser:
     score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
     score.set_defaults(command=_score)
 
+    best = _best_parser(commands)
+
     for command in (draw, plan, exam):
         command.add_argument(
             "--background",
@@ -129,10 +131,11 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_argument("--scheduler", default="", metavar="ADDRESS", help="Dask's scheduler")
 
-    for command in (draw, plan, exam, run, score):
+    for command in (draw, plan, exam, run, score, best):
         command.add_argument(
             "--out", type=Path, default=Path("runs/concealed"), help="holds cases/ and sealed/"
         )
+    for command in (draw, plan, exam, run, score):
         command.add_argument("--workers", type=int, default=os.cpu_count() or 1)
 
     drive = commands.add_parser("drive", help="drive a program round the course on a concealed robot")
@@ -148,6 +151,14 @@ def _parser() -> argparse.ArgumentParser:
     practice.add_argument("folder", type=Path)
     practice.set_defaults(command=_practice)
     return parser
+
+
+def _best_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    best = commands.add_parser("best", help="how well the best possible test would tell what a case conceals")
+    best.add_argument("case", nargs="+", help="names of cases that conceal one effect")
+    best.add_argument("--others", type=int, default=10, help="cases whose backgrounds are taken (10)")
+    best.set_defaults(command=_best)
+    return best
 
 
 def _ask_counts(parser: argparse.ArgumentParser) -> None:
@@ -281,6 +292,16 @@ def _score(chosen: argparse.Namespace) -> int:
     chosen.report.parent.mkdir(parents=True, exist_ok=True)
     chosen.report.write_text(text, encoding="utf-8", newline="\n")
     draw(judged, chosen.report.with_suffix(".png"))
+    return 0
+
+
+def _best(chosen: argparse.Namespace) -> int:
+    from benchmarks.concealed.best_test import d_prime_beside_backgrounds  # noqa: PLC0415
+
+    print(f"{'case':<10} {'d_prime':>8} {'beside backgrounds':>19}")
+    for name in chosen.case:
+        alone, beside = d_prime_beside_backgrounds(chosen.out, name, chosen.others)
+        print(f"{name:<10} {alone:8.1f} {beside:19.1f}", flush=True)
     return 0
 
 

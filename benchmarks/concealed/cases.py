@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -41,6 +42,7 @@ FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
 _QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
+_ATTEMPTS = 20  # a robot that topples that often is not drawn anew
 _REHEARSED = (0, 2, 3, 4)  # of eight recordings: enough to learn how loud something is
 _BACKGROUND_MM = (1.0, 5.0)  # how far a background moves the robot within a recording, and
 _BACKGROUND_DEG = 1.2  # turns it, as rehearsed: on the way itself it may be a little more
@@ -150,6 +152,52 @@ def draw_case(
         about |= {"world": manner.world, "setting": case.setting.as_label()}
         about |= _measured(hidden, case, worlds)
     (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
+
+
+def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str, Array], list[Act]]:
+    """Draw a sealed case once more, from its label.
+
+    Parameters
+    ----------
+    out
+        Holds ``sealed/``.
+    label
+        The case's.
+
+    Returns
+    -------
+    tuple[Hidden, Case, dict[str, Array], list[Act]]
+        What it conceals, how it is recorded, the channels in every world, and the commands of each recording.
+
+    Raises
+    ------
+    ValueError
+        If that gives other channels than those sealed.
+    """
+    things = tuple(effect["id"] for effect in label["effects"])
+    things += (label["outside"]["id"],) if label["outside"] else ()
+    manner = Manner(label["world"], "background" in label, label.get("pace", 1.0))
+    with np.load(out / "sealed" / label["case"] / "truth.npz") as archive:
+        sealed = archive["run0_on"]
+    for attempt in range(_ATTEMPTS):
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                hidden, case, worlds = _recorded(
+                    label["kind"], things, (*label["seed"], attempt), Path(folder), manner
+                )
+            except ToppledError:
+                continue
+        if not np.array_equal(worlds["run0_on"].astype(np.float32), sealed):
+            break
+        acts = []
+        for run, kind in enumerate(case.setting.runs):
+            start, _ = _task(kind, np.random.default_rng(case.seeds[run]), case.base, manner.pace)
+            acts.append(Act(start, worlds[f"run{run}_commands"], case.conditions.camera_offset_s(run)))
+        return hidden, case, worlds, acts
+    message = (
+        f"{out / 'sealed' / label['case']}: drawn anew, the case is another; expected the code that drew it"
+    )
+    raise ValueError(message)
 
 
 def _seal_faster(folder: Path, hidden: Hidden, case: Case) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -64,18 +64,42 @@ def visibility(
     Visibility
         What remains after the nuisances of each window, start pose and start angles, are projected out.
     """
-    runs = sum(1 for name in worlds if name.endswith("_on"))
-    energies = []
-    for run in range(runs):
+    return Visibility(whitened(pairs_of(worlds, with_it, without_it), conditions, window_s) ** 2)
+
+
+def pairs_of(worlds: Mapping[str, Array], with_it: str, without_it: str) -> list[tuple[Array, Array]]:
+    """Give every recording's channels in two worlds; a world that is not there is the first of them."""
+    pairs = []
+    for run in range(sum(1 for name in worlds if name.endswith("_on"))):
         there = np.asarray(worlds[f"run{run}_{with_it}"], dtype=np.float64)
         name = f"run{run}_{without_it}"
-        absent = np.asarray(worlds[name], dtype=np.float64) if name in worlds else there
-        energies.append(_run_energy(there, absent, conditions, round(window_s * conditions.log_hz)))
-    return Visibility(np.stack(energies))
+        pairs.append((there, np.asarray(worlds[name], dtype=np.float64) if name in worlds else there))
+    return pairs
 
 
-def _run_energy(there: Array, absent: Array, conditions: Conditions, window_rows: int) -> Array:
-    energy = np.zeros_like(there)
+def whitened(
+    pairs: Sequence[tuple[Array, Array]], conditions: Conditions, window_s: float = WINDOW_S
+) -> Array:
+    """Give the differences between pairs of channels in standard deviations of the noise, nuisances projected out.
+
+    Parameters
+    ----------
+    pairs
+        For every recording, noise-free channels (rows, channels) with and without something.
+    conditions, window_s
+        As :func:`visibility` takes them.
+
+    Returns
+    -------
+    Array
+        (runs, rows, channels); rows without a sample hold 0.
+    """
+    rows = round(window_s * conditions.log_hz)
+    return np.stack([_run_difference(there, absent, conditions, rows) for there, absent in pairs])
+
+
+def _run_difference(there: Array, absent: Array, conditions: Conditions, window_rows: int) -> Array:
+    found = np.zeros_like(there)
     frames = (
         camera_rows(np.arange(len(there), dtype=np.float64) / conditions.log_hz, conditions.camera_hz) > 0.0
     )
@@ -87,19 +111,19 @@ def _run_energy(there: Array, absent: Array, conditions: Conditions, window_rows
             difference = _clipped(name, there[rows, k]) - _clipped(name, absent[rows, k])
             nuisance = np.ones((window_rows, 1)) if name in ANGLES else np.zeros((window_rows, 0))
             white = _whitener(name, tuple(range(window_rows)), conditions)
-            energy[rows, k] = _remainder(white @ difference, white @ nuisance) ** 2
+            found[rows, k] = _remainder(white @ difference, white @ nuisance)
         if set(POSE) <= set(conditions.columns):
             seen = rows[frames[rows]]
-            energy[seen[:, None], _POSE_AT] = _pose_energy(
+            found[seen[:, None], _POSE_AT] = _pose_difference(
                 there[rows], absent[rows], seen - first, conditions
             )
-    return energy
+    return found
 
 
 _POSE_AT = np.array([CHANNELS.index(name) for name in POSE])
 
 
-def _pose_energy(there: Array, absent: Array, seen: Rows, conditions: Conditions) -> Array:
+def _pose_difference(there: Array, absent: Array, seen: Rows, conditions: Conditions) -> Array:
     """Move one path onto the other's start, then project out what a wrong start pose would do."""
     here, other = there[:, _POSE_AT], absent[:, _POSE_AT]
     turn = math.radians(here[0, 2] - other[0, 2])
@@ -119,7 +143,7 @@ def _pose_energy(there: Array, absent: Array, seen: Rows, conditions: Conditions
     nuisance = np.stack(
         [np.concatenate([white @ c[k] for k, white in enumerate(whites)]) for c in slopes], axis=1
     )
-    return _remainder(signal, nuisance).reshape(3, -1).T ** 2
+    return _remainder(signal, nuisance).reshape(3, -1).T
 
 
 def _remainder(signal: Array, nuisance: Array) -> Array:

@@ -63,9 +63,20 @@ class Judged:
         return self.wrong == 0 and len(self.hits) == len(self.truth)
 
     @property
+    def says_more(self) -> bool:
+        """Whether it says that something material is left which no name explains, or writes a law for it."""
+        return "unexplained" in self.verdict or "invented" in self.verdict
+
+    @property
+    def all_material(self) -> bool:
+        """Whether each thing concealed matters by itself; not known of the first examinations."""
+        concealed = [size for name, size in self.sizes.items() if name != "background"]
+        return bool(concealed) and all(map(is_material, concealed))
+
+    @property
     def half_explained(self) -> bool:
         """Whether the effects are named, nothing else is, and something is said to be left: right in mixed cases."""
-        return self.wrong == 0 and len(self.hits) == len(self.truth) - 1 and "unexplained" in self.verdict
+        return self.wrong == 0 and len(self.hits) == len(self.truth) - 1 and self.says_more
 
     @property
     def right(self) -> bool:
@@ -75,7 +86,7 @@ class Judged:
     @property
     def abstained(self) -> bool:
         """Whether it says that something is there and names nothing."""
-        return not self.named and "unexplained" in self.verdict
+        return not self.named and self.says_more
 
 
 def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[str, Any]) -> Judged:

@@ -154,7 +154,7 @@ def channels(
     if concealed.encoder_wave_deg is not None:
         wave, *phases = concealed.encoder_wave_deg
         angles = angles + wave * (np.sin(history.angles[rows] + phases) - np.sin(phases))
-    x, y, heading = _seen_pose(history, concealed, rows, concealed.pose_delay + camera_offset_s)
+    x, y, heading = seen_pose(history, concealed, rows, concealed.pose_delay + camera_offset_s)
     columns = (
         angles[:, 0],
         angles[:, 1],
@@ -276,7 +276,7 @@ def write_robot(folder: Path, base: Base) -> None:
     (folder / ROBOT_FILE).write_text(text, encoding="utf-8", newline="\n")
 
 
-def _seen_pose(
+def seen_pose(
     history: History, concealed: Concealed, ticks: Ticks, late_s: float
 ) -> tuple[Array, Array, Array]:
     """Pose as the camera has it: late, through its lens, from its slowly turning mount."""

@@ -56,6 +56,11 @@ class Rehearsal:
         self._conditions = conditions
         self._without = [self._driven(absent, act) for act in acts]
 
+    @property
+    def histories(self) -> list[History]:
+        """The runs of the robot that conceals nothing, one an act."""
+        return self._without
+
     def d_prime(self, robots: Sequence[Concealed]) -> float:
         """Give the size of the difference that one robot an act makes, as the best linear detector has it."""
         worlds: dict[str, Array] = {}

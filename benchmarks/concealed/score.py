@@ -111,12 +111,23 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
         ),
         _share("outside the catalogue: abstains", [one.abstained for one in of["outside"]], ">= 0.90"),
         _share(
+            "the same, of what is material",
+            [one.abstained for one in of["outside"] if one.all_material],
+            "",
+        ),
+        _share(
             "outside the catalogue: gives a wrong name", [bool(one.named) for one in of["outside"]], "<= 0.05"
         ),
         _share("two at once: exact set", [one.exact for one in of["double"]], ">= 0.80"),
         _share("two at once: at least one right", [bool(one.hits) for one in of["double"]], ""),
         _share("three at once: exact set", [one.exact for one in of["triple"]], ""),
         _share("mixed: effect named, rest unexplained", [one.half_explained for one in of["mixed"]], ""),
+        _share(
+            "the same, where both are material",
+            [one.half_explained for one in of["mixed"] if one.all_material],
+            ">= 0.70",
+        ),
+        _share("mixed: effect named", [bool(one.hits) for one in of["mixed"]], ">= 0.85"),
         _share("mixed: gives a wrong name", [one.wrong > 0 for one in of["mixed"]], "<= 0.05"),
         _share(
             "95 % intervals cover", [held for one in judged for held in one.covered.values()], "0.92-0.98"

@@ -1,0 +1,113 @@
+"""The best possible test: how well one who knows the truth's own laws could tell what a case conceals.
+
+d' weighs an effect against the sensors' noise. But no robot is its file: a track 0.5 % wider by nature hides one that
+is 0.6 % wider by design. Here the difference an effect makes is weighed against noise and backgrounds together: those
+of the examination's other cases, thing by thing, each driven in the case's own world under the case's commands. No
+linear test does better than the filter matched to both (Kay, Fundamentals of Statistical Signal Processing II, ch. 4),
+and no tool can know more than the laws, and how often each small thing is met.
+
+What the colour sensor read is compared along the path the camera shows: its turn and lens displace that, and its noise
+counts for nothing. For readings the figure is therefore an upper limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.concealed.background import Background
+from benchmarks.concealed.cases import redrawn
+from benchmarks.concealed.commands import SECONDS
+from benchmarks.concealed.detectability import pairs_of, whitened
+from benchmarks.concealed.history import Array
+from benchmarks.concealed.plan import read_label
+from benchmarks.concealed.recording import CHANNELS, seen_pose
+from benchmarks.concealed.rehearsal import Rehearsal, along
+from benchmarks.concealed.robot import Concealed
+
+_LIGHT_AT = CHANNELS.index("reflection_pct")
+_FIELDS = {field.name for field in fields(Concealed)}
+
+
+def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> tuple[float, float]:
+    """Give the d' of what a case conceals, beside the sensors' noise and beside backgrounds as well.
+
+    Parameters
+    ----------
+    out
+        Holds ``sealed/``.
+    name
+        Of a case that conceals one effect.
+    count
+        Of how many other cases of its world the backgrounds are taken.
+
+    Returns
+    -------
+    tuple[float, float]
+
+    Raises
+    ------
+    ValueError
+        If the case conceals anything else, or is not drawn anew as it was sealed.
+    """
+    label: Mapping[str, Any] = read_label(out, name)
+    if label["kind"] != "single":
+        message = f"{name}: found a case of kind {label['kind']}, expected single"
+        raise ValueError(message)
+    hidden, case, worlds, acts = redrawn(out, label)
+    plain = hidden.plain or hidden.off
+    rehearsal = Rehearsal(case.manner.world, plain, acts, SECONDS, case.conditions)
+    shown = whitened(pairs_of(worlds, "on", "off"), case.conditions).ravel()
+    columns = []
+    for background, amounts in _things(_others(out, label, count)):
+        pairs = rehearsal.pairs([background.on(plain, amounts)] * len(acts))
+        if not amounts:
+            pairs = _displaced(pairs, rehearsal, background.on(plain, {}), plain)
+        columns.append(whitened(pairs, case.conditions).ravel())
+    small = np.stack(columns, axis=1) / math.sqrt(count)
+    shared = small.T @ shown
+    hides = shared @ np.linalg.solve(np.eye(small.shape[1]) + small.T @ small, shared)
+    total = float(shown @ shown)
+    return math.sqrt(total), math.sqrt(max(total - float(hides), 0.0))
+
+
+def _others(out: Path, label: Mapping[str, Any], count: int) -> list[Mapping[str, Any]]:
+    """Take the first labels of other cases in the same world; there may be fewer."""
+    labels: Iterator[Mapping[str, Any]] = (
+        read_label(out, path.parent.name) for path in sorted(out.glob("sealed/*/label.json"))
+    )
+    same = [one for one in labels if one["world"] == label["world"] and one["case"] != label["case"]]
+    return same[:count]
+
+
+def _things(labels: Sequence[Mapping[str, Any]]) -> Iterator[tuple[Background, dict[str, float]]]:
+    """Give each thing of the backgrounds of labels on its own, and how much there is of it if it moves the robot."""
+    for label in labels:
+        amounts = label["background"]["amounts"]
+        for kind, stored in label["background"].items():
+            changes = {key: tuple(v) if isinstance(v, list) else v for key, v in stored.items()}
+            if kind in amounts:
+                yield Background({kind: changes}, {}, {}), {kind: amounts[kind]}
+            elif set(changes) <= _FIELDS:
+                yield Background({}, {kind: changes}, {}), {}
+
+
+def _displaced(
+    pairs: Sequence[tuple[Array, Array]], rehearsal: Rehearsal, robot: Concealed, plain: Concealed
+) -> list[tuple[Array, Array]]:
+    """Let the sensor read where a camera that is turned or has a lens shows the robot."""
+    moved = []
+    for (there, absent), history in zip(pairs, rehearsal.histories, strict=True):
+        ticks = np.arange(len(history.time_s))
+        x, y, heading = seen_pose(history, robot, ticks, 0.0)
+        light = along(replace(history, pose=np.column_stack([x, y, heading])), plain)
+        rows = np.linspace(0, len(light) - 1, len(there)).round().astype(int)
+        shifted = there.copy()
+        shifted[:, _LIGHT_AT] += light[rows] - history.light[rows]
+        moved.append((shifted, absent))
+    return moved
