@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 import pytest
 
@@ -67,3 +68,11 @@ def test_other_kinds_of_cases_and_changed_cases_are_refused(drawn):
     path.write_text(json.dumps({**label, "kind": "double"}))
     with pytest.raises(ValueError, match="found a case of kind double, expected single"):
         d_prime_beside_backgrounds(drawn, "c", 2)
+
+
+def test_where_no_other_case_has_a_background_it_says_so(drawn, tmp_path):
+    shutil.copytree(drawn / "sealed" / "b", tmp_path / "sealed" / "b")
+    with pytest.raises(ValueError, match="found no other case of b's world"):
+        d_prime_beside_backgrounds(tmp_path, "b", 2)
+    with pytest.raises(ValueError, match="found no other case of b's world"):
+        d_prime_beside_backgrounds(drawn, "b", 0)

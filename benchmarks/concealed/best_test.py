@@ -26,7 +26,7 @@ from benchmarks.concealed.commands import SECONDS
 from benchmarks.concealed.detectability import pairs_of, whitened
 from benchmarks.concealed.history import Array
 from benchmarks.concealed.plan import read_label
-from benchmarks.concealed.recording import CHANNELS, seen_pose
+from benchmarks.concealed.recording import CHANNELS, even_ticks, seen_pose
 from benchmarks.concealed.rehearsal import Rehearsal, along
 from benchmarks.concealed.robot import Concealed
 
@@ -53,23 +53,25 @@ def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> tuple[float,
     Raises
     ------
     ValueError
-        If the case conceals anything else, or is not drawn anew as it was sealed.
+        If the case conceals anything else, is not drawn anew as it was sealed, or no other has a background.
     """
     label: Mapping[str, Any] = read_label(out, name)
     if label["kind"] != "single":
         message = f"{name}: found a case of kind {label['kind']}, expected single"
         raise ValueError(message)
+    others = _others(out, label, count)
     hidden, case, worlds, acts = redrawn(out, label)
     plain = hidden.plain or hidden.off
     rehearsal = Rehearsal(case.manner.world, plain, acts, SECONDS, case.conditions)
     shown = whitened(pairs_of(worlds, "on", "off"), case.conditions).ravel()
     columns = []
-    for background, amounts in _things(_others(out, label, count)):
-        pairs = rehearsal.pairs([background.on(plain, amounts)] * len(acts))
+    for background, amounts in _imperfections(others):
+        robot = background.on(plain, amounts)
+        pairs = rehearsal.pairs([robot] * len(acts))
         if not amounts:
-            pairs = _displaced(pairs, rehearsal, background.on(plain, {}), plain)
+            pairs = _displaced(pairs, rehearsal, robot, plain, case.conditions.row_ticks)
         columns.append(whitened(pairs, case.conditions).ravel())
-    small = np.stack(columns, axis=1) / math.sqrt(count)
+    small = np.stack(columns, axis=1) / math.sqrt(len(others))
     shared = small.T @ shown
     hides = shared @ np.linalg.solve(np.eye(small.shape[1]) + small.T @ small, shared)
     total = float(shown @ shown)
@@ -77,19 +79,26 @@ def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> tuple[float,
 
 
 def _others(out: Path, label: Mapping[str, Any], count: int) -> list[Mapping[str, Any]]:
-    """Take the first labels of other cases in the same world; there may be fewer."""
+    """Take the first labels of other cases with a background in the same world; there may be fewer."""
     labels: Iterator[Mapping[str, Any]] = (
         read_label(out, path.parent.name) for path in sorted(out.glob("sealed/*/label.json"))
     )
-    same = [one for one in labels if one["world"] == label["world"] and one["case"] != label["case"]]
+    world, case = label.get("world"), label["case"]
+    same = [
+        one for one in labels if "background" in one and one.get("world") == world and one["case"] != case
+    ]
+    if not same[:count]:
+        message = f"{out}: found no other case of {case}'s world with a background, expected one or more"
+        raise ValueError(message)
     return same[:count]
 
 
-def _things(labels: Sequence[Mapping[str, Any]]) -> Iterator[tuple[Background, dict[str, float]]]:
-    """Give each thing of the backgrounds of labels on its own, and how much there is of it if it moves the robot."""
+def _imperfections(labels: Sequence[Mapping[str, Any]]) -> Iterator[tuple[Background, dict[str, float]]]:
+    """Give each small imperfection of other cases on its own, with its amount if it moves the robot."""
     for label in labels:
-        amounts = label["background"]["amounts"]
-        for kind, stored in label["background"].items():
+        kinds = dict(label["background"])
+        amounts = kinds.pop("amounts")
+        for kind, stored in kinds.items():
             changes = {key: tuple(v) if isinstance(v, list) else v for key, v in stored.items()}
             if kind in amounts:
                 yield Background({kind: changes}, {}, {}), {kind: amounts[kind]}
@@ -98,16 +107,18 @@ def _things(labels: Sequence[Mapping[str, Any]]) -> Iterator[tuple[Background, d
 
 
 def _displaced(
-    pairs: Sequence[tuple[Array, Array]], rehearsal: Rehearsal, robot: Concealed, plain: Concealed
+    pairs: Sequence[tuple[Array, Array]],
+    rehearsal: Rehearsal,
+    robot: Concealed,
+    plain: Concealed,
+    row_ticks: int,
 ) -> list[tuple[Array, Array]]:
     """Let the sensor read where a camera that is turned or has a lens shows the robot."""
     moved = []
     for (there, absent), history in zip(pairs, rehearsal.histories, strict=True):
-        ticks = np.arange(len(history.time_s))
-        x, y, heading = seen_pose(history, robot, ticks, 0.0)
-        light = along(replace(history, pose=np.column_stack([x, y, heading])), plain)
-        rows = np.linspace(0, len(light) - 1, len(there)).round().astype(int)
+        ticks = even_ticks(history, row_ticks)
+        seen = np.column_stack(seen_pose(history, robot, ticks, 0.0))
         shifted = there.copy()
-        shifted[:, _LIGHT_AT] += light[rows] - history.light[rows]
+        shifted[:, _LIGHT_AT] += along(replace(history, pose=seen), plain) - history.light[ticks]
         moved.append((shifted, absent))
     return moved

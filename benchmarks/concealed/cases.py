@@ -176,7 +176,7 @@ def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str
     """
     things = tuple(effect["id"] for effect in label["effects"])
     things += (label["outside"]["id"],) if label["outside"] else ()
-    manner = Manner(label["world"], "background" in label, label.get("pace", 1.0))
+    manner = Manner(label.get("world", "mujoco"), "background" in label, label.get("pace", 1.0))
     with np.load(out / "sealed" / label["case"] / "truth.npz") as archive:
         sealed = archive["run0_on"]
     for attempt in range(_ATTEMPTS):
@@ -194,9 +194,7 @@ def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str
             start, _ = _task(kind, np.random.default_rng(case.seeds[run]), case.base, manner.pace)
             acts.append(Act(start, worlds[f"run{run}_commands"], case.conditions.camera_offset_s(run)))
         return hidden, case, worlds, acts
-    message = (
-        f"{out / 'sealed' / label['case']}: drawn anew, the case is another; expected the code that drew it"
-    )
+    message = f"{label['case']}: found other channels than those sealed, expected the code that drew it"
     raise ValueError(message)
 
 

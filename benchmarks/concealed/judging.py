@@ -50,7 +50,7 @@ class Judged:
     @property
     def material(self) -> bool:
         """Whether anything concealed matters to somebody who drives a course; not known of the first examinations."""
-        return any(is_material(size) for name, size in self.sizes.items() if name != "background")
+        return any(self._material)
 
     @property
     def wrong(self) -> int:
@@ -70,8 +70,12 @@ class Judged:
     @property
     def all_material(self) -> bool:
         """Whether each thing concealed matters by itself; not known of the first examinations."""
-        concealed = [size for name, size in self.sizes.items() if name != "background"]
-        return bool(concealed) and all(map(is_material, concealed))
+        return bool(self._material) and all(self._material)
+
+    @property
+    def _material(self) -> list[bool]:
+        """Whether it matters, of each thing concealed."""
+        return [is_material(size) for name, size in self.sizes.items() if name != "background"]
 
     @property
     def half_explained(self) -> bool:
