@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("mujoco", reason="MUJOCO IS MISSING: worlds are not compared (pip install gecar[test])")
 
 from benchmarks.concealed import cases, commands
+from benchmarks.concealed.__main__ import main
 from benchmarks.concealed.cases import Manner, draw_case
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.history import replayed
@@ -176,6 +177,18 @@ def test_plan_of_several_worlds_has_counts_for_each():
     assert {len(case.effects) for case in planned if case.kind == "triple"} == {3}
     mixed = next(case for case in planned if case.kind == "mixed")
     assert [effect in EFFECTS for effect in mixed.effects] == [True, False]
+
+
+def test_a_world_with_counts_of_its_own_has_no_other_kinds(monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))
+    counts = ["--world", "continuous:none=2,single=1", "--world", "bullet:none=1"]
+    assert main(["plan", "--seed", "3", *counts, "--double", "1", "--out", str(tmp_path)]) == 0
+    kinds = sorted((case.manner.world, case.kind) for case in drawn)
+    assert kinds == [
+        ("bullet", "double"), ("bullet", "none"),
+        ("continuous", "double"), ("continuous", "none"), ("continuous", "none"), ("continuous", "single"),
+    ]  # fmt: skip
 
 
 def test_faster_recordings_of_a_slow_case_are_sealed(tmp_path):

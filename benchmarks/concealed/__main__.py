@@ -120,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
             "--world",
             action="append",
             metavar="NAME[:KIND=N,...]",
-            help=f"of {', '.join(WORLDS)}; repeat for several, each with counts of its own (mujoco)",
+            help=f"of {', '.join(WORLDS)}; repeat for several; one with counts of its own has no other kinds (mujoco)",
         )
 
     for command in (exam, run):
@@ -201,7 +201,7 @@ def _plan(chosen: argparse.Namespace) -> int:
 
 
 def _by_world(chosen: argparse.Namespace) -> dict[str, Counts]:
-    """Read how many cases of each kind each world has."""
+    """Read how many cases of each kind each world has: of a world that names some itself, no others."""
     from benchmarks.concealed.plan import Counts  # noqa: PLC0415
 
     counts: dict[str, Counts] = {}
@@ -214,7 +214,8 @@ def _by_world(chosen: argparse.Namespace) -> dict[str, Counts]:
                 f"--world: found {asked}, expected one of {', '.join(WORLDS)}, and, if wanted, :KIND=N,KIND=N"
             )
             raise ValueError(message)
-        counts[world] = replace(_counts(chosen, Counts()), **{kind: int(number) for kind, _, number in pairs})
+        whole = Counts(**dict.fromkeys(asdict(Counts()), 0)) if pairs else Counts()
+        counts[world] = replace(_counts(chosen, whole), **{kind: int(number) for kind, _, number in pairs})
     return counts
 
 
