@@ -28,7 +28,7 @@ from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
-from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.prove.confirmation import (
     Confirmation,
     dropped,
@@ -40,6 +40,7 @@ from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
+from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of
@@ -173,6 +174,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     split, known = context.split, context.robot
     context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
+    split = _without_log_faults(split, known, noise)
     fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
     motion = _explain_motion(context, fitted, held)
     fitted = _along_paths(
@@ -226,6 +228,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             else (),
             motion.encoders_left_out,
             [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen],
+            context.split,
         ),
         evidence=Evidence(
             motion.explained,
@@ -237,6 +240,15 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             known,
         ),
     )
+
+
+def _without_log_faults(split: Split, known: Robot, noise: Noise) -> Split:
+    """Return recordings with faults of their logs made good."""
+    fitted, held = (
+        tuple(without_log_faults(run, known.physics, noise.sd, noise.walk, MEMORY_S) for run in runs)
+        for runs in (split.fitted, split.held)
+    )
+    return replace(split, fitted=fitted, held=held)
 
 
 @dataclass(frozen=True)

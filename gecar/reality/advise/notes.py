@@ -21,6 +21,7 @@ def notes_on(
     alike: Sequence[Sequence[str]] = (),
     encoders_left_out: bool = False,
     unseen: Sequence[str] = (),
+    as_logged: Split | None = None,
 ) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
@@ -42,6 +43,8 @@ def notes_on(
         Whether the encoders were left out, as nothing explains them.
     unseen
         Effects found that the recordings set aside do not show.
+    as_logged
+        The same recordings with the faults of their logs.
     """
     notes = [
         f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
@@ -53,6 +56,7 @@ def notes_on(
         + ("." if BY_ID[effect].at_a_place else ", and each that shows it, left out, confirms it.")
         for effect in unseen
     ]
+    notes += _log_faults(split, as_logged or split)
     if encoders_left_out:
         notes.append(
             "The encoders have an error of their own, which no effect of the catalogue explains. They were left out: "
@@ -91,3 +95,21 @@ def _start(run: RecordingResiduals) -> str:
     x, y, heading = run.nuisances.start
     degrees = np.degrees(heading) % 360.0
     return f"{run.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"
+
+
+def _log_faults(split: Split, as_logged: Split) -> list[str]:
+    """Return a note on missing rows, and one on times that were made even."""
+    runs, logged = ((*each.fitted, *each.held) for each in (split, as_logged))
+    notes = []
+    lost = sum(len(run.lost_t_s) for run in runs)
+    if lost:
+        gaps = "once" if lost == 1 else f"{lost} times"
+        notes.append(
+            f"The logs miss rows, and {gaps} the command changed there. When it did was told by what the wheels did."
+        )
+    even = [run.name for run, was in zip(runs, logged, strict=True) if not np.array_equal(run.t_s, was.t_s)]
+    if even:
+        notes.append(
+            f"The times of rows in {', '.join(even)} jitter by more than the wheels' motion does: even times were used."
+        )
+    return notes

@@ -53,6 +53,9 @@ class Recording(Displayed):
         What the TOML beside the file says.
     warnings
         Things passed over in reading, a line each.
+    lost_t_s, lost_commands
+        Commands at rows that the log misses, where something tells them: times [s], shape (k,), and left and right,
+        shape (k, 2).
     """
 
     name: str
@@ -69,6 +72,8 @@ class Recording(Displayed):
     yaw_rate_rad_s: Series
     setup: Setup = field(default_factory=Setup)
     warnings: tuple[str, ...] = ()
+    lost_t_s: Series = field(default_factory=lambda: np.zeros(0))
+    lost_commands: Series = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def duration_s(self) -> float:

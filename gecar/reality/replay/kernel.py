@@ -85,8 +85,8 @@ _load_pose, _store_pose = lane_access(POSE, _OF_POSE)
 
 @kernel
 def _held(commands: Array, t: Array, motor: int, at: int, start: float, end: float, cap: float) -> float:
-    """Return a motor's mean command between two times; ``at`` is the last row before ``start``, -1 for none."""
-    if at >= 0 and (at + 1 == t.shape[0] or t[at + 1] >= end):  # one row holds throughout: nearly always
+    """Return a motor's mean command between two times; ``at`` is the last of them before ``start``, -1 for none."""
+    if at >= 0 and (at + 1 == t.shape[0] or t[at + 1] >= end):  # one holds throughout: nearly always
         return min(max(commands[at, motor], -cap), cap) * (end - start)
     total = 0.0
     while start < end:
@@ -369,11 +369,11 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
             # Velocities live at mid-step: commands from the last middle to this one, less delay, on the log's clock.
             begin = ((n - 0.5) * dt - delay) / stretch
             end = ((n + 0.5) * dt - delay) / stretch
-            while at + 1 < inputs.t.shape[0] and inputs.t[at + 1] <= begin:
+            while at + 1 < inputs.command_t.shape[0] and inputs.command_t[at + 1] <= begin:
                 at += 1
             share = stretch / dt
-            left = _held(inputs.commands, inputs.t, 0, at, begin, end, cap) * share
-            right = _held(inputs.commands, inputs.t, 1, at, begin, end, cap) * share
+            left = _held(inputs.commands, inputs.command_t, 0, at, begin, end, cap) * share
+            right = _held(inputs.commands, inputs.command_t, 1, at, begin, end, cap) * share
             _remember_yaw(flat, lanes)
             if terms:
                 _advance_with_terms(left, right, inputs.bench, shared, stores[0], flat)

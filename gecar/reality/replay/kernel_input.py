@@ -17,8 +17,8 @@ class KernelInput(NamedTuple):
     ----------
     t
         Time of each row from the start of the simulation [s], shape (rows,).
-    commands
-        Duty of both motors, before the cap, shape (rows, 2).
+    command_t, commands
+        From when on commands are held [s], shape (commands,), and duty of both motors, before the cap, (commands, 2).
     measured
         Left angle, right angle [rad], battery [V], yaw rate [rad/s]; nan where absent, shape (rows, 4).
     pose_t, pose
@@ -34,6 +34,7 @@ class KernelInput(NamedTuple):
     """
 
     t: Array
+    command_t: Array
     commands: Array
     measured: Array
     pose_t: Array

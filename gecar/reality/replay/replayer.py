@@ -215,8 +215,11 @@ def replayer_of(
     if zero < first:
         t, commands = np.r_[0.0, t], np.vstack([commands[:1], commands])
         measured = np.vstack([np.full((1, 4), np.nan), measured])
+    command_t = np.r_[t, recording.lost_t_s - zero]
+    order = np.argsort(command_t, kind="stable")
+    command_t, commands = command_t[order], np.vstack([commands, recording.lost_commands])[order]
     inputs = KernelInput(
-        t, commands, measured, pose_t, pose, np.array(sd, float), np.array(walk, float), memory_s,
+        t, command_t, commands, measured, pose_t, pose, np.array(sd, float), np.array(walk, float), memory_s,
         r.setup.rig == "bench",
     )  # fmt: skip
     return Replayer(recording, inputs, pose, _first_pose(pose))
