@@ -42,8 +42,9 @@ class LinearResiduals:
     def recordings(self) -> tuple[Any, ...]:
         return tuple(SimpleNamespace(recording=run(self.gap_s)) for _ in range(self.count))
 
-    def gyro_errors(self) -> np.ndarray:
-        return np.zeros((len(self.noise), 3))
+    @property
+    def instrument_errors(self) -> np.ndarray:
+        return np.zeros((len(self.noise), 7))
 
     def part(self, numbers: Sequence[int]) -> LinearResiduals:
         rows = np.isin(self.index.recording, numbers)

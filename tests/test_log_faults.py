@@ -1,4 +1,4 @@
-"""Faults of logs, missing rows and times that jitter, are told by what the wheels did."""
+"""Faults of logs, missing rows and times that jitter, are told by what the wheels did; and errors of instruments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.recordings.split import Split
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.of_case import ENCODER_WAVE_RAD, motion_residuals
 from gecar.reality.residuals.threads import Threads
 
 MEMORY_S = 1.0
@@ -100,3 +100,14 @@ def test_a_note_tells_what_was_made_good(whole: Recording, noise: Noise) -> None
     assert any("miss rows, and once the command changed there" in note for note in notes)
     assert any("times of rows in run_0 jitter" in note for note in notes)
     assert not any("rows" in note for note in notes_on(split, residuals, False, False, as_logged=split)[1:])
+
+
+def test_an_encoder_s_wave_adds_to_residuals_what_is_foretold(whole: Recording, noise: Noise) -> None:
+    angle = whole.left_angle_rad
+    waving = replace(whole, left_angle_rad=angle + ENCODER_WAVE_RAD * np.sin(angle))
+    plain, waved = (motion_residuals([run], noise, MEMORY_S, Threads(1)) for run in (whole, waving))
+    added = waved.errors(EV3.physics) - plain.errors(EV3.physics)
+    sine = plain.instrument_errors[:, 3]
+    assert np.abs(added).max() > 0.5
+    assert added == pytest.approx(sine, abs=1e-6)
+    assert np.all(plain.instrument_errors[plain.index.channel > 1, 3:] == 0.0)

@@ -6,6 +6,7 @@ sees are separated: effects of one kind do not change residuals of the other.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -27,6 +28,7 @@ Mask = npt.NDArray[np.bool_]
 Physics = npt.NDArray[Any]
 
 GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: within 2 %, 0.6 deg/s, 10 ms
+ENCODER_WAVE_RAD = math.radians(1.0)  # as much as such an encoder's resolution
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
@@ -76,21 +78,28 @@ class Residuals:
         )
         return whole.kept(there), there
 
-    def gyro_errors(self) -> Array:
-        """Return what a gyro with a scale, a bias and a delay of its own adds to residuals of motion, shape (n, 3).
+    @cached_property
+    def instrument_errors(self) -> Array:
+        """What a gyro and encoders with errors of their own add to residuals of motion, shape (n, 7).
 
-        Of a size that is not worth a name: `GYRO_SCALE`, `GYRO_BIAS_RAD_S` and `GYRO_LATE_S`.
+        The gyro's scale, bias and delay, and a wave a turn, of any phase, of the left and the right encoder. Of a size
+        that is not worth a name: `GYRO_SCALE`, `GYRO_BIAS_RAD_S`, `GYRO_LATE_S` and `ENCODER_WAVE_RAD`.
         """
         if self.sensor or not self.recordings:
-            return np.zeros((len(self.index.t_s), 3))
+            return np.zeros((len(self.index.t_s), 7))
         parts = []
         for run in self.recordings:
             rows, poses = len(run.replayer.t), len(run.replayer.inputs.pose_t)
-            part = np.zeros((4 * rows + 3 * poses, 3))
+            part = np.zeros((4 * rows + 3 * poses, 7))
             rate, t = run.replayer.measured[:, 3], run.replayer.t
             late = -GYRO_LATE_S * np.gradient(smoothed_rows(rate, t), t)
             added = np.column_stack([GYRO_SCALE * rate, np.full(rows, GYRO_BIAS_RAD_S), late])
-            part[3 * rows : 4 * rows] = added / float(run.noise.sd[2])
+            part[3 * rows : 4 * rows, :3] = added / float(run.noise.sd[2])
+            for side in range(2):
+                angle = run.replayer.measured[:, side]
+                for k, wave in enumerate((np.sin, np.cos)):
+                    left = _beyond_memory(t, ENCODER_WAVE_RAD * wave(angle), run.replayer.inputs.memory)
+                    part[side * rows : (side + 1) * rows, 3 + 2 * side + k] = left / float(run.noise.sd[0])
             parts.append(part)
         return np.concatenate(parts)[self._located[1]]
 
@@ -195,3 +204,20 @@ def motion_residuals(
         for r in recordings
     )
     return Residuals(beside, sensor=False, threads=threads)
+
+
+def _beyond_memory(t: Array, errors: Array, memory_s: float) -> Array:
+    """Return what remains of an encoder's errors [rad] in a replay that is drawn towards them, shape (rows,).
+
+    As `gecar.reality.replay.kernel` draws wheel angles: a young mean weighs all it has seen alike, an old one forgets.
+    """
+    if math.isinf(memory_s):
+        return errors
+    left = np.zeros(len(errors))
+    offset, weight, before = 0.0, 0.0, -math.inf
+    for k, (now, error) in enumerate(zip(t.tolist(), errors.tolist(), strict=True)):
+        if not math.isnan(error):
+            weight, before = 1.0 + weight * math.exp(-(now - before) / memory_s), now
+            left[k] = error - offset
+            offset += left[k] / weight
+    return left

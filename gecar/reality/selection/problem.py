@@ -217,7 +217,7 @@ def small_sensitivities(
     Some may be so many times as large (``sized``).
 
     The ripple of a motor that is known for none has no phase yet: it may be any sum of sines. It comes after all other
-    effects; then, under no name, what a gyro's own scale and bias do.
+    effects; then, under no name, what errors of a gyro and of encoders do.
     """
     plain = problem.estimator.under(None)
     found = plain.plain_sensitivities(model, problem.catalogue)
@@ -231,7 +231,7 @@ def small_sensitivities(
         if RIPPLE not in model.effects:
             waves = ripple_responses(plain.robot, problem.recordings, plain.trial(model, RIPPLE))
             out[RIPPLE] = np.concatenate([np.zeros((len(model.errors), 0)), *waves], axis=1)
-    return {**out, "": problem.residuals.gyro_errors()}
+    return {**out, "": problem.residuals.instrument_errors}
 
 
 def _small(effect: str) -> list[Parameter]:
