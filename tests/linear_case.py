@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.parameters import free
-from gecar.reality.materiality import Size
+from gecar.reality.materiality import DEFAULT, Size
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.channels import ResidualIndex
-from gecar.reality.selection.problem import Problem, problem_of
+from gecar.reality.selection.problem import Problem
 from gecar.world.robot import load_robot
 
 EV3 = load_robot("ev3")
@@ -112,5 +113,6 @@ def linear(
 
 
 def linear_problem(residuals: LinearResiduals) -> Problem:
-    problem = problem_of(residuals, EV3, tuple(residuals.responses))  # type: ignore[arg-type]
-    return replace(problem, sizes=LinearSizes(residuals))  # type: ignore[arg-type]
+    estimator = Estimator(residuals, EV3, np.random.default_rng(0))  # type: ignore[arg-type]
+    sizes, effects = LinearSizes(residuals), tuple(residuals.responses)
+    return Problem(estimator, effects, DEFAULT, sizes, estimator.known(), lambda line: None)  # type: ignore[arg-type]

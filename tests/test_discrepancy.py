@@ -21,6 +21,7 @@ from gecar.reality.recordings.recording import Case, Recording, write_recording
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.parting import Sizes
 from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.problem import worth_a_name
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
@@ -31,6 +32,7 @@ RESPONSES = {effect: bumps(seed, 4, 1.0) for seed, effect in enumerate(FOUR, sta
 SLOPES = np.stack(list(RESPONSES.values()), axis=1)
 INDEX = linear({}, RESPONSES).index
 BLOCKS = Blocks(INDEX)
+SIZES = np.full(len(FOUR), SMALL), np.full(len(FOUR), LARGE)
 
 
 def test_small_changes_are_noise_of_unit_variance_and_so_is_their_sum_with_noise() -> None:
@@ -38,7 +40,7 @@ def test_small_changes_are_noise_of_unit_variance_and_so_is_their_sum_with_noise
     for _ in range(300):
         errors = rng.normal(size=len(SLOPES)) + SLOPES @ rng.normal(0.0, SMALL, len(FOUR))
         if not drawn:
-            made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, SMALL, LARGE)
+            made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, *SIZES)
             made = replace(made, root_weight=np.ones(len(errors)))
         drawn.append(made.basis.T @ made.whitened(errors))
     assert np.std(drawn, axis=0) == pytest.approx(np.ones(len(FOUR)), abs=0.15)
@@ -47,7 +49,7 @@ def test_small_changes_are_noise_of_unit_variance_and_so_is_their_sum_with_noise
 def test_small_changes_are_told_within_their_bounds() -> None:
     true = np.array([0.4, -0.3, 0.0, 5.0])
     errors = np.random.default_rng(0).normal(size=len(SLOPES)) - SLOPES @ true
-    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, SMALL, LARGE)
+    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, *SIZES)
     found = made.small_changes(errors, np.full(4, -10.0), np.full(4, 10.0))
     assert found == pytest.approx(true, abs=0.1)
     kept = made.small_changes(errors, np.full(4, -1.0), np.array([1.0, 0.0, 1.0, 1.0]))
@@ -58,9 +60,7 @@ def test_small_changes_are_told_within_their_bounds() -> None:
 def test_physics_in_no_list_makes_a_channel_as_noisy_as_it_leaves_it() -> None:
     unlisted = bumps(9, 4, 2.0)
     noise = np.random.default_rng(0).normal(size=len(unlisted))
-    made, none = (
-        discrepancy(SLOPES, e, BLOCKS, INDEX.channel, SMALL, LARGE) for e in (noise + unlisted, noise)
-    )
+    made, none = (discrepancy(SLOPES, e, BLOCKS, INDEX.channel, *SIZES) for e in (noise + unlisted, noise))
     assert made.ratios[0] == pytest.approx(
         1.0 + 50 * np.mean(unlisted**2) * 0.7, rel=0.3
     )  # spans of 50 samples
@@ -104,6 +104,37 @@ def test_sizes_are_millimetres_and_degrees_that_anybody_can_check() -> None:
     # Half a track of 60 mm: a metre of spinning on the spot is 16.7 rad, of which 3 % are 28.6 degrees.
     assert 3.0 < apart.deg_1m < 28.7
     assert 3.0 < sizes.left(narrow).deg_1m <= 1.1 * apart.deg_1m
+
+
+def test_worth_a_name_is_what_moves_the_robot_by_a_material_amount() -> None:
+    sizes, line = sizes_of([recorded(EV3, seed) for seed in range(3)]), Material(5.0)
+    shares = worth_a_name(sizes, line, EV3, ("track_width", "rolling_resistance", "load_transfer"))
+    assert 0.15 <= shares["track_scale"] < 0.6
+    narrow = EV3.with_effects({"track_width": {"scale": 1.0 + 0.006 * shares["track_scale"]}}).physics
+    assert line.times(sizes.apart(EV3.physics, narrow)) == pytest.approx(1.0, rel=0.1)
+    # Never below what the law itself is off by, never above the catalogue's size.
+    assert shares["com_height"] >= 0.6
+    assert max(shares.values()) <= 1.0
+    assert worth_a_name(sizes, Material(500.0), EV3, ("track_width",)) == {"track_scale": 1.0}
+
+
+def test_recordings_set_aside_count_in_what_an_effect_does() -> None:
+    still, spun = [recorded(EV3, 0, most=0)], [recorded(EV3, 1)]
+    narrow = EV3.with_effects({"track_width": {"scale": 0.97}}).physics
+    alone = sizes_of(still)
+    beside = replace(alone, beside=sizes_of(spun).runs)
+    assert alone.apart(EV3.physics, narrow).deg_1m < 0.1
+    assert beside.apart(EV3.physics, narrow).deg_1m > 1.0
+    assert beside.left(narrow) == alone.left(narrow)
+
+
+def test_small_changes_each_have_their_own_size() -> None:
+    errors = np.random.default_rng(0).normal(size=len(SLOPES)) - SLOPES @ np.array([0.5, 0.5, 0.0, 0.0])
+    small = np.array([0.3, 0.01, 0.3, 0.3])
+    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, small, SIZES[1])
+    found = made.small_changes(errors, np.full(4, -1.0), np.full(4, 1.0))
+    assert found[0] == pytest.approx(0.5, abs=0.1)
+    assert found[1] < 0.3
 
 
 def test_recordings_without_poses_say_nothing_of_a_place() -> None:

@@ -277,7 +277,7 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     If none of these does, the encoders may be wrong, or what is left may be at one place on the floor.
     """
     catalogue = observable(context.catalogue, fitted)
-    problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell)
+    problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell, held)
     motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
     if motion.explained.unexplained and not motion.laws:
         motion = _without_encoders(context, fitted, held) or motion
@@ -296,7 +296,9 @@ def _without_encoders(context: _Context, fitted: Residuals, held: Residuals) -> 
         return None
     context.tell("much is unexplained: once more without the encoders")
     catalogue = observable(context.catalogue, blind[0])
-    problem = problem_of(blind[0], context.robot, catalogue, context.material, context.seed, context.tell)
+    problem = problem_of(
+        blind[0], context.robot, catalogue, context.material, context.seed, context.tell, blind[1]
+    )
     motion = _with_intervals(context, explained_and_confirmed(problem, blind[1]))
     if not motion.explained.steps or motion.explained.unexplained:
         return None
@@ -316,8 +318,8 @@ def _explain_sensor(
     # A late camera and a skewed clock shift what is read, too.
     known = motion.taken.parameters.robot.with_effects(motion.taken.values)
     catalogue = observable(context.catalogue, residuals)
-    problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell)
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
+    problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell, beside)
     seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     seen = with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), beside)

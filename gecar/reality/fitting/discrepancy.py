@@ -3,7 +3,7 @@
 No robot equals its file: its constants are slightly off, and there is always small physics in no catalogue. Both
 are part of the noise here, so that an effect is named only where it stands out of them.
 
-*Small changes.* Every parameter of the catalogue may be off by a small normal number, in sizes worth a name. Integrated
+*Small changes.* Every parameter of the catalogue may be off by a small normal number. Integrated
 out, these changes are correlated noise of covariance 1 + G G', where the columns of G are their sensitivities times its
 standard deviation; residuals are multiplied by its inverse root. An effect can then gain no more than what its size
 costs as a small change, and an imitation gains less than the small changes it imitates.
@@ -49,7 +49,7 @@ class Discrepancy:
     ratios
         Variance of each channel over its sensors' noise, shape (channels,).
     small
-        Standard deviation of small changes, in sizes worth a name.
+        Standard deviations of small changes, in the catalogue's sizes, shape (changes,).
     """
 
     scale: Array
@@ -58,7 +58,7 @@ class Discrepancy:
     spread: Array
     back: Array
     ratios: Array
-    small: float
+    small: Array
 
     def whitened(self, errors: Array) -> Array:
         """Return residuals of unit variance, shape (n,) or (m, n), from those in units of the sensors' noise."""
@@ -69,7 +69,7 @@ class Discrepancy:
         return out
 
     def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
-        """Return the most likely small changes within bounds, in sizes worth a name, shape (changes,)."""
+        """Return the most likely small changes within bounds, in the catalogue's sizes, shape (changes,)."""
         inside = (errors * self.scale * self.root_weight) @ self.basis
         rows = np.vstack([self.spread[:, None] * self.back, np.eye(self.back.shape[1])])
         asked = -np.r_[inside, np.zeros(self.back.shape[1])]
@@ -78,14 +78,14 @@ class Discrepancy:
 
 
 def discrepancy(
-    slopes: Array, errors: Array, blocks: Blocks, channel: npt.NDArray[np.int32], small: float, large: float
+    slopes: Array, errors: Array, blocks: Blocks, channel: npt.NDArray[np.int32], small: Array, large: Array
 ) -> Discrepancy:
     """Return the discrepancy of a model.
 
     Parameters
     ----------
     slopes
-        Derivatives of its residuals by every small change, in sizes worth a name, shape (n, changes).
+        Derivatives of its residuals by every small change, in the catalogue's sizes, shape (n, changes).
     errors
         Its residuals, in units of the sensors' noise, shape (n,).
     blocks
@@ -93,7 +93,7 @@ def discrepancy(
     channel
         Of each, shape (n,).
     small, large
-        Standard deviation of small changes, and of those whose remainder is physics in no list.
+        Standard deviations of small changes, and of those whose remainder is physics in no list, shape (changes,).
     """
     ratios, weight = np.ones(len(CHANNELS)), np.ones(len(errors))
     for _ in range(ROUNDS):
@@ -107,9 +107,9 @@ def discrepancy(
     return Discrepancy(scale, weight, *_decomposed(slopes, scale, weight, small), ratios, small)
 
 
-def _decomposed(slopes: Array, scale: Array, weight: Array, size: float) -> tuple[Array, Array, Array]:
-    """Return singular vectors and values of sensitivities to changes of a size, by way of their small Gram matrix."""
-    columns = slopes * (size * scale * weight)[:, None]
+def _decomposed(slopes: Array, scale: Array, weight: Array, size: Array) -> tuple[Array, Array, Array]:
+    """Return singular vectors and values of sensitivities to changes of some sizes, by their small Gram matrix."""
+    columns = slopes * size * (scale * weight)[:, None]
     squares, back = np.linalg.eigh(columns.T @ columns)
     felt = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1.0)
     spread, back = np.sqrt(squares[felt]), back[:, felt]

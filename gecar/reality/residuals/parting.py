@@ -52,19 +52,22 @@ class Sizes:
         The recordings; their readings are compared along their paths, where they have any.
     sensor
         Whether the colour sensor counts, or else the motion.
+    beside
+        More recordings, of which only the commands count: how far two robots part under them.
     """
 
     runs: tuple[RecordingResiduals, ...]
     sensor: bool
+    beside: tuple[RecordingResiduals, ...] = ()
 
     def of(self, residuals: Residuals) -> Sizes:
         """Return the sizes under the commands of other recordings."""
-        return Sizes(residuals.recordings, residuals.sensor)
+        return Sizes(residuals.recordings, residuals.sensor, self.beside)
 
     def apart(self, one: Physics, other: Physics) -> Size:
         """Return how far two robots part, in the recording where that is most; physics records of shape (1,)."""
         of = _reading_apart if self.sensor else _apart
-        return combined([of(run, one, other) for run in self.runs])
+        return combined([of(run, one, other) for run in (*self.runs, *self.beside)])
 
     def left(self, physics: Physics) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from gecar.reality.selection.thresholds import (
     STOPPED,
     WORSE,
 )
-from gecar.world.effects import BY_ID
+from gecar.world.effects import BY_ID, Parameter
 
 Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
@@ -32,15 +32,22 @@ AT_BOUND = 0.01  # coordinates
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
 
 
-def worthwhile(parameters: Parameters, z: Array, effect: str) -> bool:
-    """Whether an effect's size at a vector of parameters is worth a name."""
+def worthwhile(
+    parameters: Parameters,
+    z: Array,
+    effect: str,
+    share: Callable[[Parameter], float] = lambda p: 1.0,  # noqa: ARG005
+) -> bool:
+    """Whether an effect's size at a vector of parameters is worth a name: this share of the catalogue's, or more."""
     if BY_ID[effect].worth:
-        found = parameters.values(z)[effect]
+        found, of = parameters.values(z)[effect], {p.label: share(p) for p in BY_ID[effect].parameters}
         return any(
-            all(found[label] >= size for label, size in worth.items()) for worth in BY_ID[effect].worth
+            all(found[label] >= of[label] * size for label, size in worth.items())
+            for worth in BY_ID[effect].worth
         )
     return any(
-        not _is_stopped(parameters, z, k) and abs(z[k]) >= (LEAST_INVERSE if c.inverse else 1.0)
+        not _is_stopped(parameters, z, k)
+        and abs(z[k]) >= (LEAST_INVERSE if c.inverse else share(c.parameter))
         for k, c in enumerate(parameters.coordinates)
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     )
@@ -122,7 +129,8 @@ def proved(step: Step) -> bool:
 
 def is_material(problem: Problem, model: Model, step: Step) -> bool:
     """Whether an effect is worth a name, and moves the robot by enough for anyone to mind."""
-    return is_worthwhile(model, step.effect) and problem.material.times(size_of(problem, model, step)) >= 1.0
+    worth = worthwhile(model.parameters, model.z, step.effect, problem.share)
+    return worth and problem.material.times(size_of(problem, model, step)) >= 1.0
 
 
 def size_of(problem: Problem, model: Model, step: Step) -> Size:

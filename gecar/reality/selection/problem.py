@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,8 @@ class Problem:
         Whether each camera's clock offset was fitted.
     refused
         Effects of the catalogue that are not tried, as recordings set aside do not confirm them.
+    worth
+        Which share of the catalogue's size is worth a name here, by field of the physics record; 1 where none is given.
     """
 
     estimator: Estimator
@@ -60,6 +62,7 @@ class Problem:
     tell: Callable[[str], None]
     clocks_fitted: bool = False
     refused: frozenset[str] = frozenset()
+    worth: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def residuals(self) -> Residuals:
@@ -94,28 +97,38 @@ class Problem:
 
         A motor on a bench is known to tenths of a percent, and what its model is off by is what one looks for.
         """
-        return self if self.on_bench else self._beside(model, free_effects, SMALL, lambda parameter: 1.0)  # noqa: ARG005
+        if self.on_bench:
+            return self
+        return self._beside(model, free_effects, lambda p: (SMALL * self.share(p), LARGE))
 
     def beside_unnamed(self, model: Model) -> Problem:
         """Return the problem beside changes of all other parameters of a size that a bench leaves open (`unnamed`)."""
-        return self._beside(model, None, UNNAMED, unnamed)
+        return self._beside(model, None, lambda p: (UNNAMED * unnamed(p), LARGE * unnamed(p)))
+
+    def share(self, parameter: Parameter | None) -> float:
+        """Return which share of a parameter's size in the catalogue is worth a name here."""
+        return self.worth.get(parameter.field, 1.0) if parameter else 1.0
 
     def _beside(
         self,
         model: Model,
         free_effects: Sequence[str] | None,
-        small: float,
-        sized: Callable[[Parameter], float],
+        sized: Callable[[Parameter | None], tuple[float, float]],
     ) -> Problem:
-        """Return the problem beside changes of a standard deviation, by parameter so many times as large."""
+        """Return the problem beside changes of small and large standard deviations, by parameter."""
         if not self.blocks:
             return self
         kept = model.effects if free_effects is None else free_effects
-        slopes = np.concatenate(
-            [np.where(e in kept, 0.0, g) for e, g in small_sensitivities(self, model, sized).items()], axis=1
-        )
+        slopes, sizes = [], []
+        for effect, columns in small_sensitivities(self, model).items():
+            slopes.append(np.where(effect in kept, 0.0, columns))
+            of_effect: list[Parameter | None] = [*_small(effect)] if effect in BY_ID else []
+            sizes += [sized(p) for p in of_effect or [None] * columns.shape[1]]  # ripples, instruments: none
         errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
-        left = discrepancy(slopes, errors, self.estimator.blocks, channel, small, LARGE)
+        small, large = np.array(sizes).reshape(-1, 2).T
+        left = discrepancy(
+            np.concatenate(slopes, axis=1), errors, self.estimator.blocks, channel, small, large
+        )
         estimator = self.estimator.under(left)
         return replace(self, estimator=estimator, known=estimator.known())
 
@@ -139,9 +152,11 @@ class Problem:
         z, (lowest, highest) = parameters.vector(model.values), parameters.bounds
         place = {(c.effect.id, c.parameter.label): k for k, c in enumerate(parameters.coordinates)}
         at = [place[effect, p.label] for effect in self.catalogue for p in _small(effect)]
-        low, high = np.full(slopes, -1.0), np.full(slopes, 1.0)  # ripples and gyro come last, and stay out
-        low[: len(at)] = np.clip(lowest[at] - z[at], -1.0, -LEAST_ROOM)
-        high[: len(at)] = np.clip(highest[at] - z[at], LEAST_ROOM, 1.0)
+        # Those of ripples and instruments come last, and stay out.
+        low, high = np.full(slopes, -1.0), np.full(slopes, 1.0)
+        room = np.array([self.share(parameters.coordinates[k].parameter) for k in at])
+        low[: len(at)] = np.clip(lowest[at] - z[at], -room, -LEAST_ROOM)
+        high[: len(at)] = np.clip(highest[at] - z[at], LEAST_ROOM, room)
         z[at] += self.estimator.discrepancy.small_changes(errors, low, high)[: len(at)]
         return parameters.values(np.clip(z, lowest, highest))
 
@@ -161,7 +176,7 @@ class Problem:
         self.tell("the camera's clock differs from recording to recording: its offsets are fitted")
         estimator = Estimator(fitted, self.estimator.robot, self.estimator.rng)
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        sizes = Sizes(fitted.recordings, fitted.sensor)
+        sizes = self.sizes.of(fitted)
         return replace(
             self,
             estimator=estimator,
@@ -179,6 +194,7 @@ def problem_of(
     material: Material = DEFAULT,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+    held: Residuals | None = None,
 ) -> Problem:
     """Set a selection problem.
 
@@ -196,21 +212,52 @@ def problem_of(
         Random seed.
     tell
         Called with a line of progress.
+    held
+        Recordings set aside, under whose commands it counts, too, what robots differ by.
     """
     estimator = Estimator(residuals, robot, np.random.default_rng(seed))
-    sizes = Sizes(residuals.recordings, residuals.sensor)
-    return Problem(estimator, tuple(catalogue), material, sizes, estimator.known(), tell)
+    beside = held.recordings if held else ()
+    sizes = Sizes(residuals.recordings, residuals.sensor, beside)
+    # What a sensor reads along a path tells little below what is known of the path.
+    small = not (estimator.on_bench or residuals.sensor)
+    worth = worth_a_name(sizes, material, robot, catalogue) if small else {}
+    return Problem(estimator, tuple(catalogue), material, sizes, estimator.known(), tell, worth=worth)
 
 
-def unnamed(parameter: Parameter) -> float:
+def worth_a_name(
+    sizes: Sizes, material: Material, robot: Robot, catalogue: Sequence[str]
+) -> dict[str, float]:
+    """Return which share of each parameter's size in the catalogue moves the robot by what is material, by field.
+
+    It is 1 where all of it does not, and no less than what the simulation's own laws may be off by
+    (`Parameter.model_error_steps`).
+    """
+    known = free(robot, ()).physics(np.zeros(0))
+    out = {}
+    for effect in catalogue:
+        parameters = free(robot, (effect,))
+        highest = parameters.bounds[1]
+        for k, c in enumerate(parameters.coordinates):
+            if c.parameter not in _small(effect):
+                continue
+            z = np.zeros(parameters.size)
+            z[k] = 1.0 if highest[k] >= 1.0 else -1.0
+            times = material.times(sizes.apart(known, parameters.physics(z)))
+            out[c.parameter.field] = min(1.0, max(1.0 / max(times, 1e-9), c.parameter.model_error_steps))
+    return out
+
+
+def unnamed(parameter: Parameter | None) -> float:
     """Return how many times `UNNAMED` a parameter may differ from its known value: as motors do, or below a name."""
+    if parameter is None:
+        return 1.0
     return max(parameter.differs / (UNNAMED * parameter.worthwhile), 1.0)
 
 
 def small_sensitivities(
     problem: Problem,
     model: Model,
-    sized: Callable[[Parameter], float] = lambda p: 1.0,  # noqa: ARG005
+    sized: Callable[[Parameter | None], float] = lambda p: 1.0,  # noqa: ARG005
 ) -> dict[str, Array]:
     """Return the derivatives of residuals by small changes, in sizes worth a name, by effect, shape (n, changes).
 

@@ -100,7 +100,7 @@ WORSE = Threshold(
 # -- What a simulation is off by
 SMALL = Threshold(
     0.3,
-    "sizes worth naming: standard deviation of the errors of a robot's constants",
+    "sizes worth naming here: standard deviation of the errors of a robot's constants",
     "with `PRICE`, effects are named from 1.3 sizes; 0.5 missed half of those worth naming, in cases with a background",
 )
 UNNAMED = Threshold(

@@ -29,7 +29,8 @@ from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
-SIZES = np.geomspace(1.0, 60.0, 12)  # in sizes worth a name; more than any bound
+LARGEST = 60.0  # of the catalogue's sizes: more than any bound
+TRIED = 12  # sizes
 SURE = 1.645  # 95 % quantile of a normal distribution
 NEEDED = np.sqrt(2.0 * PRICE) + SURE
 MOST_PLACES = 10  # on the floor, where an effect has one
@@ -54,7 +55,7 @@ def _limit(problem: Problem, model: Model, effect: str) -> Limit | None:
     parameters = free(problem.estimator.robot, (*model.effects, effect))
     k = next(k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect)
     c, low, high = parameters.coordinates[k], *(float(bound[k]) for bound in parameters.bounds)
-    sides = [side for side, room in ((1.0, high), (-1.0, -low)) if room > SIZES[0]]
+    sides = [side for side, room in ((1.0, high), (-1.0, -low)) if room > problem.share(c.parameter)]
     found = [
         max((_smallest(problem, parameters, shape, k, side) for side in sides), key=abs)
         for shape in _shapes(problem, model, parameters, effect)
@@ -79,29 +80,30 @@ def _shapes(problem: Problem, model: Model, parameters: Parameters, effect: str)
 def _smallest(problem: Problem, parameters: Parameters, start: Array, k: int, side: float) -> float:
     """Return the smallest value of a coordinate, on one side of neutral, that would be named; infinite: none would."""
     coordinate, (low, high) = parameters.coordinates[k], parameters.bounds
-    scale = 1.0 if not coordinate.inverse else high[k] / SIZES[-1]
-    vectors = np.tile(start, (len(SIZES) + 1, 1))
-    vectors[:, k] = np.clip(side * scale * np.r_[0.0, SIZES], low[k], high[k])
+    scale = 1.0 if not coordinate.inverse else high[k] / LARGEST
+    sizes = np.geomspace(problem.share(coordinate.parameter), LARGEST, TRIED)
+    vectors = np.tile(start, (TRIED + 1, 1))
+    vectors[:, k] = np.clip(side * scale * np.r_[0.0, sizes], low[k], high[k])
     none, *some = problem.estimator.residual(parameters)(vectors)
     shown = np.array([_shown(errors - none) for errors in some])
     enough = np.flatnonzero(shown >= NEEDED)
     if not len(enough):
         return math.inf
-    for n in range(int(enough[0]), len(SIZES)):
-        if worthwhile(parameters, vectors[n + 1], coordinate.effect.id) and _material(
+    for n in range(int(enough[0]), TRIED):
+        if worthwhile(parameters, vectors[n + 1], coordinate.effect.id, problem.share) and _material(
             problem, parameters, vectors[0], vectors[n + 1]
         ):
-            z = side * scale * _between(shown, n) if n == enough[0] else vectors[n + 1, k]
+            z = side * scale * _between(sizes, shown, n) if n == enough[0] else vectors[n + 1, k]
             return float(np.clip(MARGIN * z, low[k], high[k]))
     return math.inf
 
 
-def _between(shown: Array, n: int) -> float:
-    """Return the size at which enough shows, between the n-th of `SIZES` and the one before."""
+def _between(sizes: Array, shown: Array, n: int) -> float:
+    """Return the size at which enough shows, between the n-th and the one before."""
     if n == 0 or shown[n] <= shown[n - 1]:
-        return float(SIZES[n])
+        return float(sizes[n])
     share = np.log(NEEDED / max(shown[n - 1], 1e-9)) / np.log(shown[n] / max(shown[n - 1], 1e-9))
-    return float(SIZES[n - 1] * (SIZES[n] / SIZES[n - 1]) ** np.clip(share, 0.0, 1.0))
+    return float(sizes[n - 1] * (sizes[n] / sizes[n - 1]) ** np.clip(share, 0.0, 1.0))
 
 
 def _shown(change: Array) -> float:
