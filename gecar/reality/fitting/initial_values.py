@@ -119,7 +119,7 @@ def top_speed(recording: Recording) -> float:
 
 
 def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
-    for duty in (2.0, 5.0, 10.0, 15.0, 20.0):
+    for duty in (0.3, 2.0, 5.0, 10.0, 15.0, 20.0):
         yield {"duty_pct": duty, "offset_share": 1.0}
     levels = np.unique(np.abs(np.concatenate([r.commands.ravel() for r in recordings]))) * 100.0
     edges = (levels[1:] + levels[:-1]) / 2.0
@@ -256,10 +256,12 @@ def _patch(x_m: float, y_m: float, radius_m: float, grip: float) -> dict[str, fl
     return {"radius_m": radius_m, "x_m": x_m, "y_m": y_m, "coefficient": grip}
 
 
-def _top_speeds(robot: Robot) -> Iterator[Values]:
+def _top_speeds(robot: Robot, recordings: Sequence[Recording]) -> Iterator[Values]:
+    """Begin at shares of a motor's top speed, and just below the fastest recorded: what limits speeds is seen there."""
     top = robot.battery.voltage / max(robot.motor.back_emf_constant, 1e-3) * robot.drive.duty_cap
-    for share in (0.92, 0.8, 0.65, 0.5):
-        yield {"speed_rad_s": max(share * top, BY_ID["speed_limit"].parameters[0].low)}
+    seen = max(map(top_speed, recordings), default=0.0)
+    for speed in (*(share * top for share in (0.92, 0.8, 0.65, 0.5)), 0.98 * seen, 0.95 * seen):
+        yield {"speed_rad_s": max(speed, BY_ID["speed_limit"].parameters[0].low)}
 
 
 def _currents(robot: Robot) -> Iterator[Values]:
@@ -282,6 +284,6 @@ _SCANS: dict[str, Scan] = {
     "shaft cycles": _shaft_cycles,
     "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
     "shares of stall current": lambda robot, recordings, errors: _currents(robot),  # noqa: ARG005
-    "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot),  # noqa: ARG005
+    "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot, recordings),  # noqa: ARG005
     "around the mount": lambda robot, recordings, errors: _mounts(robot),  # noqa: ARG005
 }

@@ -93,7 +93,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             for s, share in judged
         ]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        stay = {e for e in places if not _is_beside_a_gap(explained, without[e])}
+        # What no other recording tests may stand in for whatever else is unexplained.
+        stay = {e for e in places if not (explained.unexplained or _is_beside_a_gap(explained, without[e]))}
         failing = [(s, share) for s, share in judged if share.margin <= 0.0 and s.effect not in stay]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)

@@ -90,7 +90,12 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     enough = [step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best)]
     if problem.on_bench:
         return [step for step in enough if not stopped(step, own=True)]
-    return [step for step in enough if not (stopped(step) or worsens(problem, step.base, step.model))]
+    return [step for step in enough if not (stopped(step) or _worsens(problem, step))]
+
+
+def _worsens(problem: Problem, step: Step) -> bool:
+    """Whether whole drives come out worse; not of a place: a drive that is a little off misses it."""
+    return not BY_ID[step.effect].at_a_place and worsens(problem, step.base, step.model)
 
 
 def imitates_dry_friction(problem: Problem, model: Model) -> bool:
