@@ -26,7 +26,7 @@ Errors = Callable[[Sequence[Values]], Array]
 
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
-_SIZES = (3.0, 12.0)  # in steps worth a name
+_SIZES = (0.5, 3.0, 12.0)  # in steps worth a name; where less is material, fits begin at less
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
