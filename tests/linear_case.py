@@ -92,7 +92,7 @@ class LinearSizes:
         change = self.residuals.errors(one) - self.residuals.errors(other)
         return Size(mm_1m=10.0 * float(np.sqrt(np.mean(change**2))))
 
-    def left(self, physics: np.ndarray) -> Size:
+    def left(self, physics: np.ndarray, repeatedly: bool = False) -> Size:
         beyond = np.mean(self.residuals.errors(physics) ** 2) - 1.0
         return Size(mm_1m=10.0 * float(np.sqrt(max(beyond, 0.0))))
 

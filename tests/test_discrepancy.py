@@ -22,7 +22,7 @@ from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.parting import Sizes
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import worth_a_name
-from gecar.reality.selection.stepwise import explain
+from gecar.reality.selection.stepwise import explain, left_share
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
 from gecar.world.effects import CATALOGUE
@@ -126,6 +126,20 @@ def test_recordings_set_aside_count_in_what_an_effect_does() -> None:
     assert alone.apart(EV3.physics, narrow).deg_1m < 0.1
     assert beside.apart(EV3.physics, narrow).deg_1m > 1.0
     assert beside.left(narrow) == alone.left(narrow)
+
+
+def test_what_is_left_repeatedly_is_so_in_two_recordings_at_least() -> None:
+    narrow = EV3.with_effects({"track_width": {"scale": 0.97}}).physics
+    still, spun = [recorded(EV3, k, most=0) for k in range(3)], [recorded(EV3, k) for k in (5, 6)]
+    assert sizes_of([*still, spun[0]]).left(narrow, repeatedly=True).deg_1m < 0.3
+    assert sizes_of([*still, *spun]).left(narrow, repeatedly=True).deg_1m > 1.0
+    assert sizes_of([*still, *spun]).left(narrow).deg_1m < 0.3
+    assert sizes_of(spun[:1]).left(narrow, repeatedly=True).deg_1m > 1.0
+
+
+def test_laws_may_leave_what_they_are_off_by() -> None:
+    assert left_share(()) < left_share(("pose_delay",)) < left_share(("backlash",))
+    assert left_share(("pose_delay", "backlash")) == left_share(("backlash",)) > 0.12
 
 
 def test_small_changes_each_have_their_own_size() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -69,13 +70,16 @@ class Sizes:
         of = _reading_apart if self.sensor else _apart
         return combined([of(run, one, other) for run in (*self.runs, *self.beside)])
 
-    def left(self, physics: Physics) -> Size:
+    def left(self, physics: Physics, repeatedly: bool = False) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
 
-        Where a motor hardly overcomes friction, nothing is known well: one such recording shall not decide.
+        Or as far as it repeatedly does: in one of four, and in more than one if there are more. Where a motor hardly
+        overcomes friction, nothing is known well: one such recording shall not decide.
         """
         of = _reading_left if self.sensor else _left
-        return combined([of(run, physics) for run in self.runs], statistics.median)
+        return combined(
+            [of(run, physics) for run in self.runs], _repeated if repeatedly else statistics.median
+        )
 
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
@@ -86,6 +90,12 @@ class Sizes:
         seen = [run for run in self.runs if run.replayer.has_poses]
         passing = [size for run in seen if (size := _left_about(run, physics, spot)) is not None]
         return Size() if len(passing) < min(2, len(seen)) else combined(passing, statistics.median_low)
+
+
+def _repeated(sizes: list[float]) -> float:
+    """Return the size that one of four reach, two at least."""
+    often = min(max(2, math.ceil(len(sizes) / 4)), len(sizes))
+    return sorted(sizes)[-often]
 
 
 def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:

@@ -130,8 +130,9 @@ def concluded(
     part of what is left without them.
     """
     problem = problem.under(model)
-    left = problem.sizes.left(problem.with_small_changes(model))
-    now, before = (problem.material.times(size) for size in (left, problem.sizes.left(problem.known.physics)))
+    left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
+    initial = problem.sizes.left(problem.known.physics, repeatedly=True)
+    now, before = (problem.material.times(size) for size in (left, initial))
     share, matters = now / max(before, 1.0), now > MEASURED
     if matters and share > (1.0 - WHOLE_SHARE) ** 0.5:
         kept = [step for step in steps if steady(problem, step) and _is_main(problem, model, step, now)]
@@ -145,15 +146,22 @@ def concluded(
         problem = problem.under(model, [step.effect for step in named])
         model = problem.estimator.fit([step.effect for step in named], model.values)
     return Explanation(
-        problem, model, named, tuple(tried), left, matters and share > LEFT_SHARE, minor, whole
+        problem, model, named, tuple(tried), left, matters and share > left_share(model.effects), minor, whole
     )
+
+
+def left_share(effects: Sequence[str]) -> float:
+    """Return the share of the error without effects that they may leave, as their own laws are off by as much."""
+    off = (p.model_error for e in effects for p in BY_ID[e].parameters if p.worthwhile > 0.0)
+    return LEFT_SHARE + max(off, default=0.0)
 
 
 def _is_main(problem: Problem, model: Model, step: Step, times: float) -> bool:
     """Whether an effect explains a good part of what the others leave; ``times`` the line is left with it."""
     rest = [effect for effect in model.effects if effect != step.effect]
     here = problem.under(model, rest)
-    without = here.sizes.left(here.with_small_changes(here.estimator.fit(rest, model.values)))
+    fitted = here.estimator.fit(rest, model.values)
+    without = here.sizes.left(here.with_small_changes(fitted), repeatedly=True)
     return times**2 < (1.0 - MAIN_SHARE) * problem.material.times(without) ** 2
 
 

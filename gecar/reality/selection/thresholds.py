@@ -80,9 +80,9 @@ UNSTEADY = Threshold(
     "6 cases of the continuous world (seed 161): right laws 0.01 to 0.21, wrong ones 0.07 to 0.9",
 )
 LEFT_SHARE = Threshold(
-    0.15,
-    "share of the initial error that may remain without being reported as unexplained",
-    "laws are off by up to 12 % of an effect's size (`Parameter.model_error`)",
+    0.03,
+    "share of the initial error that may remain beside what the laws found are off by (`Parameter.model_error`)",
+    "a camera 40 ms late left 8 % beside a robot pulled to one side, which is material",
 )
 
 MEASURED = Threshold(
