@@ -241,7 +241,7 @@ CATALOGUE: tuple[Effect, ...] = (
     Effect("command_slew", "commands ramp instead of stepping",
            (_P("command_slew", "rate_pct_s", "%/s", 30.0, math.inf, math.inf, 0.0, 0.01, 500.0),),
            ("motor",), "big steps", "rate limiter on duty",
-           starts=_values("rate_pct_s", 1500.0, 600.0, 250.0, 100.0)),
+           starts=_values("rate_pct_s", 6000.0, 1500.0, 600.0, 250.0, 100.0)),
     Effect("current_limit", "the motor driver limits the current",
            (_P("current_limit", "current_a", "A", 0.05, math.inf, math.inf, 0.0, 1.0, 1.0),),
            ("motor",), "from rest, reversals, stall", "current chopping of PWM drivers",
