@@ -25,10 +25,8 @@ AFTER_S = 0.4  # for which wheels tell when a command changed
 CLIP = 5.0  # standard deviations that one sample counts at most
 SHARES = np.array([0.5, 0.25, 0.75, 0.0, 1.0])  # of lost rows, with the next command; first: no answer
 ROUNDS = 2
-LEAST_JITTER, JITTER = (
-    0.001,
-    0.25,
-)  # of the time between rows: less is nothing, and beyond rows are not meant to be even
+LEAST_JITTER = 0.001  # of the time between rows: less is nothing
+JITTER = 0.25  # beyond it, rows are not meant to be even
 
 
 def without_log_faults(

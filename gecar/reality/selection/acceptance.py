@@ -26,18 +26,19 @@ from gecar.reality.selection.thresholds import (
 from gecar.world.effects import BY_ID, Parameter
 
 Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+Share = Callable[[Parameter], float]  # of a parameter's size in the catalogue that is worth a name
 
 BREAKAWAY = "static_friction"
 AT_BOUND = 0.01  # coordinates
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
 
 
-def worthwhile(
-    parameters: Parameters,
-    z: Array,
-    effect: str,
-    share: Callable[[Parameter], float] = lambda p: 1.0,  # noqa: ARG005
-) -> bool:
+def whole(parameter: Parameter) -> float:  # noqa: ARG001
+    """Return the share of a parameter's size in the catalogue that is worth a name where nothing else is said."""
+    return 1.0
+
+
+def worthwhile(parameters: Parameters, z: Array, effect: str, share: Share = whole) -> bool:
     """Whether an effect's size at a vector of parameters is worth a name: this share of the catalogue's, or more."""
     if BY_ID[effect].worth:
         found, of = parameters.values(z)[effect], {p.label: share(p) for p in BY_ID[effect].parameters}
@@ -53,9 +54,9 @@ def worthwhile(
     )
 
 
-def is_worthwhile(model: Model, effect: str) -> bool:
+def is_worthwhile(model: Model, effect: str, share: Share = whole) -> bool:
     """Whether an effect's size in a model is worth a name."""
-    return worthwhile(model.parameters, model.z, effect)
+    return worthwhile(model.parameters, model.z, effect, share)
 
 
 def worsens(problem: Problem, without: Model, with_effect: Model, sizes: Sizes | None = None) -> bool:
@@ -134,7 +135,7 @@ def proved(step: Step) -> bool:
 
 def is_material(problem: Problem, model: Model, step: Step) -> bool:
     """Whether an effect is worth a name, and moves the robot by enough for anyone to mind."""
-    worth = worthwhile(model.parameters, model.z, step.effect, problem.share)
+    worth = is_worthwhile(model, step.effect, problem.share)
     return worth and problem.material.times(size_of(problem, model, step)) >= 1.0
 
 

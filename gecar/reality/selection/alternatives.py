@@ -6,7 +6,7 @@ import numpy as np
 
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import costs
-from gecar.reality.selection.acceptance import imitates_dry_friction, worthwhile
+from gecar.reality.selection.acceptance import imitates_dry_friction, is_worthwhile
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
 
@@ -26,10 +26,6 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
         uncertain = loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2))
         if imitates_dry_friction(explained.problem, swapped):
             continue
-        if (
-            close
-            and uncertain
-            and worthwhile(swapped.parameters, swapped.z, other.effect, explained.problem.share)
-        ):
+        if close and uncertain and is_worthwhile(swapped, other.effect, explained.problem.share):
             out[other.effect] = swapped
     return out
