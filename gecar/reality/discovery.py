@@ -37,7 +37,7 @@ from gecar.reality.prove.confirmation import (
 )
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
-from gecar.reality.recordings.recording import Case
+from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
@@ -174,7 +174,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     split, known = context.split, context.robot
     context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
-    split = _without_log_faults(split, known, noise)
+    split = _without_log_faults(split, known, noise, threads)
     fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
     motion = _explain_motion(context, fitted, held)
     fitted = _along_paths(
@@ -242,12 +242,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     )
 
 
-def _without_log_faults(split: Split, known: Robot, noise: Noise) -> Split:
-    """Return recordings with faults of their logs made good."""
-    fitted, held = (
-        tuple(without_log_faults(run, known.physics, noise.sd, noise.walk, MEMORY_S) for run in runs)
-        for runs in (split.fitted, split.held)
-    )
+def _without_log_faults(split: Split, known: Robot, noise: Noise, threads: Threads) -> Split:
+    """Return the recordings with missing rows and jittering times of their logs repaired."""
+
+    def repaired(run: Recording) -> Recording:
+        return without_log_faults(run, known.physics, noise.sd, noise.walk, MEMORY_S)
+
+    fitted, held = (tuple(threads.map(repaired, runs)) for runs in (split.fitted, split.held))
     return replace(split, fitted=fitted, held=held)
 
 

@@ -26,7 +26,6 @@ Array = npt.NDArray[np.float64]
 LEAST_SHOWN = 25.0  # squared standard deviations: what shows an effect by itself
 WHOLLY = 0.1  # by which the bounds of a share may differ from 1 where all of an effect is asked for
 APART_S = 1.5  # between two passes of a place
-GAP = 1.6  # times the usual time between rows from which on one is missing
 BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
 
@@ -176,12 +175,11 @@ def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
     for number, sums in sums_of_spans(residuals.index, _shown(explained, without)).items():
         shown_s = SPAN_S * np.flatnonzero(sums >= LEAST_SHOWN)
         parts = np.split(shown_s, np.flatnonzero(np.diff(shown_s) > APART_S) + 1)
-        log_s = residuals.recordings[number].recording.t_s
-        passes += [(log_s, part[0], part[-1]) for part in parts if len(part)]
+        passes += [(residuals.recordings[number].recording, part[0], part[-1]) for part in parts if len(part)]
     if len(passes) != 1:
         return False
-    t, first_s, last_s = passes[0]
-    gaps_s = (t - t[0])[:-1][np.diff(t) > GAP * np.median(np.diff(t))]
+    recording, first_s, last_s = passes[0]
+    gaps_s = recording.t_s[recording.gaps] - recording.t_s[0]
     return bool(np.any((gaps_s > first_s - BEFORE_S) & (gaps_s < last_s + SPAN_S)))
 
 

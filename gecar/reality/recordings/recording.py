@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from gecar.displayed import Displayed
 from gecar.errors import expected
@@ -22,6 +23,7 @@ from gecar.reality.recordings.setup import Setup, read_setup, setup_toml
 
 LOGS = (".txt", ".log", ".dat", ".tsv", ".mat", ".xlsx")
 ANGLES = ("left_angle_deg", "right_angle_deg")
+GAP = 1.6  # times the usual time between rows from which on one is missing
 LONGEST_S = 36_000.0  # a replay simulates every millisecond between two rows, however few there are
 
 
@@ -79,6 +81,12 @@ class Recording(Displayed):
     def duration_s(self) -> float:
         """Time from the first row to the last [s]."""
         return float(self.t_s[-1] - self.t_s[0])
+
+    @property
+    def gaps(self) -> npt.NDArray[np.intp]:
+        """The rows after which the log misses at least one, shape (k,)."""
+        apart = np.diff(self.t_s)
+        return np.flatnonzero(apart > GAP * np.median(apart)) if len(apart) else np.zeros(0, np.intp)
 
     @property
     def measured(self) -> tuple[str, ...]:

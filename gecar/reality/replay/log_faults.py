@@ -1,4 +1,4 @@
-"""Faults of a log that are no physics: rows it misses, and rows whose times jitter. What the wheels did tells them.
+"""Repair of logs that miss rows or whose times jitter, by how the wheels moved.
 
 A brick that is busy drops rows, and the command of such a row is not known: held on until the next row, a step comes
 late by a row's time. One that writes a row a moment after it read its sensors gives a step the wrong time by as much.
@@ -19,7 +19,6 @@ from gecar.reality.replay.replayer import replayer_of
 
 Array = npt.NDArray[np.float64]
 
-GAP = 1.5  # times the usual time between rows, and more, is a gap
 LEAST_CHANGE = 0.005  # of duty: smaller ones move nothing
 AFTER_S = 0.4  # for which wheels tell when a command changed
 CLIP = 5.0  # standard deviations that one sample counts at most
@@ -32,7 +31,7 @@ JITTER = 0.25  # beyond it, rows are not meant to be even
 def without_log_faults(
     recording: Recording, physics: npt.NDArray[Any], sd: Array, walk: Array, memory_s: float
 ) -> Recording:
-    """Return a recording with even times, if its wheels turned at those, and with commands inside its log's gaps.
+    """Return a recording with even row times, where they fit the wheels better, and with commands inside its gaps.
 
     Parameters
     ----------
@@ -45,7 +44,7 @@ def without_log_faults(
     """
 
     def off(tried: Recording) -> Array:
-        """Return how far each row's angles and yaw rate are off, squared, shape (rows,)."""
+        """Return the squared residual of angles and yaw rate at each row, shape (rows,)."""
         errors = replayer_of(tried, sd, walk, memory_s).play(physics).row_errors[:, [0, 1, 3]]
         return np.asarray(np.minimum(np.nan_to_num(errors) ** 2, CLIP**2).sum(axis=1))
 
@@ -57,7 +56,7 @@ def without_log_faults(
     t, commands = recording.t_s, recording.commands
     apart, usual = np.diff(t), float(np.median(np.diff(t)))
     changed = np.abs(np.diff(commands, axis=0)).max(axis=1) > LEAST_CHANGE
-    gaps = np.flatnonzero((apart > GAP * usual) & changed)
+    gaps = recording.gaps[changed[recording.gaps]]
     until = np.searchsorted(t, t[gaps + 1] + AFTER_S)
 
     def with_shares(chosen: Array) -> Recording:
@@ -77,7 +76,7 @@ def without_log_faults(
 
 
 def _with_even_times(recording: Recording) -> Recording | None:
-    """Return a recording with its rows at even times, gaps apart; None where they are even, or not meant to be."""
+    """Return a recording with evenly spaced rows, gaps kept; None if they are even, or too uneven for that."""
     t = recording.t_s
     usual = float(np.median(np.diff(t)))
     number = np.r_[0.0, np.cumsum(np.maximum(np.round(np.diff(t) / usual), 1.0))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -67,8 +68,13 @@ class Sizes:
 
     def apart(self, one: Physics, other: Physics) -> Size:
         """Return how far two robots part, in the recording where that is most; physics records of shape (1,)."""
+        return self.apart_of_each(one, [other])[0]
+
+    def apart_of_each(self, one: Physics, others: Sequence[Physics]) -> list[Size]:
+        """Return the same of one robot and each of several others."""
         of = _reading_apart if self.sensor else _apart
-        return combined([of(run, one, other) for run in (*self.runs, *self.beside)])
+        parts = [of(run, one, others) for run in (*self.runs, *self.beside)]
+        return [combined([part[k] for part in parts]) for k in range(len(others))]
 
     def left(self, physics: Physics, repeatedly: bool = False) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
@@ -93,17 +99,25 @@ class Sizes:
 
 
 def _repeated(sizes: list[float]) -> float:
-    """Return the size that one of four reach, two at least."""
+    """Return the largest size that a quarter of them reach, and at least two where there are two."""
     often = min(max(2, math.ceil(len(sizes) / 4)), len(sizes))
     return sorted(sizes)[-often]
 
 
-def _apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
-    track = float(one["track_width"][0])
-    played, other_played = _replayed(run, one), _replayed(run, other)
-    wheels, other_wheels = _reckoned(run, one, played.rows), _reckoned(run, other, other_played.rows)
-    poses = _parting(_seen(run, played, one), _seen(run, other_played, other), wheels, track, QUIET)
-    return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
+def _apart(run: RecordingResiduals, one: Physics, others: Sequence[Physics]) -> list[Size]:
+    track, (path, wheels) = float(one["track_width"][0]), _driven(run, one)
+    out = []
+    for other in others:
+        other_path, other_wheels = _driven(run, other)
+        poses = _parting(path, other_path, wheels, track, QUIET)
+        out.append(poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET)))
+    return out
+
+
+def _driven(run: RecordingResiduals, physics: Physics) -> tuple[Array, Array]:
+    """Return a replay's path as the camera reports it, and by dead reckoning, shapes (rows, 3)."""
+    played = _replayed(run, physics)
+    return _seen(run, played, physics), _reckoned(run, physics, played.rows)
 
 
 def _left(run: RecordingResiduals, physics: Physics) -> Size:
@@ -142,8 +156,9 @@ def _path_noise(run: RecordingResiduals) -> _Noise:
     return _Noise(float(place), float(heading))
 
 
-def _reading_apart(run: RecordingResiduals, one: Physics, other: Physics) -> Size:
-    return Size(reading_pct=_root_mean((run.readings(one) - run.readings(other)) ** 2))
+def _reading_apart(run: RecordingResiduals, one: Physics, others: Sequence[Physics]) -> list[Size]:
+    readings = run.readings(one)
+    return [Size(reading_pct=_root_mean((readings - run.readings(other)) ** 2)) for other in others]
 
 
 def _reading_left(run: RecordingResiduals, physics: Physics) -> Size:

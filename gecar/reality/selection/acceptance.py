@@ -34,7 +34,7 @@ RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of 
 
 
 def whole(parameter: Parameter) -> float:  # noqa: ARG001
-    """Return the share of a parameter's size in the catalogue that is worth a name where nothing else is said."""
+    """Return the whole of a parameter's size in the catalogue: its share that is worth a name by default."""
     return 1.0
 
 
@@ -95,7 +95,7 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
 
 
 def _worsens(problem: Problem, step: Step) -> bool:
-    """Whether whole drives come out worse; not of a place: a drive that is a little off misses it."""
+    """Whether whole drives come out worse. A place on the floor is exempt: a drive slightly off its path misses it."""
     return not BY_ID[step.effect].at_a_place and worsens(problem, step.base, step.model)
 
 

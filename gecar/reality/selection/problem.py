@@ -115,7 +115,7 @@ class Problem:
         free_effects: Sequence[str] | None,
         sized: Callable[[Parameter | None], tuple[float, float]],
     ) -> Problem:
-        """Return the problem beside changes of small and large standard deviations, by parameter."""
+        """Return the problem with all other parameters uncertain by a small and a large standard deviation of each."""
         if not self.blocks:
             return self
         kept = model.effects if free_effects is None else free_effects
@@ -227,23 +227,22 @@ def problem_of(
 def worth_a_name(
     sizes: Sizes, material: Material, robot: Robot, catalogue: Sequence[str]
 ) -> dict[str, float]:
-    """Return which share of each parameter's size in the catalogue moves the robot by what is material, by field.
+    """Return the share of each parameter's size in the catalogue that is material in these recordings, by field.
 
     It is 1 where all of it does not, and no less than what the simulation's own laws may be off by
     (`Parameter.model_error_steps`).
     """
-    known = free(robot, ()).physics(np.zeros(0))
-    out = {}
+    small, changed = [], []
     for effect in catalogue:
         parameters = free(robot, (effect,))
-        highest = parameters.bounds[1]
-        for k, c in enumerate(parameters.coordinates):
-            if c.parameter not in _small(effect):
-                continue
-            z = np.zeros(parameters.size)
-            z[k] = 1.0 if highest[k] >= 1.0 else -1.0
-            times = material.times(sizes.apart(known, parameters.physics(z)))
-            out[c.parameter.field] = min(1.0, max(1.0 / max(times, 1e-9), c.parameter.model_error_steps))
+        sides = np.where(parameters.bounds[1] >= 1.0, 1.0, -1.0)
+        for alone, c in zip(np.diag(sides), parameters.coordinates, strict=True):
+            if c.parameter in _small(effect):
+                small.append(c.parameter)
+                changed.append(parameters.physics(alone))
+    out = {}
+    for p, apart in zip(small, sizes.apart_of_each(robot.physics, changed), strict=True):
+        out[p.field] = min(1.0, max(1.0 / max(material.times(apart), 1e-9), p.model_error_steps))
     return out
 
 
@@ -257,7 +256,7 @@ def unnamed(parameter: Parameter | None) -> float:
 def small_sensitivities(
     problem: Problem,
     model: Model,
-    sized: Callable[[Parameter | None], float] = lambda p: 1.0,  # noqa: ARG005
+    sized: Callable[[Parameter], float] = lambda p: 1.0,  # noqa: ARG005
 ) -> dict[str, Array]:
     """Return the derivatives of residuals by small changes, in sizes worth a name, by effect, shape (n, changes).
 

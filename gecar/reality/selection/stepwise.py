@@ -151,7 +151,7 @@ def concluded(
 
 
 def left_share(effects: Sequence[str]) -> float:
-    """Return the share of the error without effects that they may leave, as their own laws are off by as much."""
+    """Return the share of the initial error that effects may leave, because their laws are approximate."""
     off = (p.model_error for e in effects for p in BY_ID[e].parameters if p.worthwhile > 0.0)
     return LEFT_SHARE + max(off, default=0.0)
 

@@ -99,7 +99,7 @@ def _smallest(problem: Problem, parameters: Parameters, start: Array, k: int, si
 
 
 def _between(sizes: Array, shown: Array, n: int) -> float:
-    """Return the size at which enough shows, between the n-th and the one before."""
+    """Return the size at which `NEEDED` is reached, interpolated between the n-th size and the one before."""
     if n == 0 or shown[n] <= shown[n - 1]:
         return float(sizes[n])
     share = np.log(NEEDED / max(shown[n - 1], 1e-9)) / np.log(shown[n] / max(shown[n - 1], 1e-9))
