@@ -26,6 +26,7 @@ from gecar.reality.selection.stepwise import explain, left_share
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
 from gecar.world.effects import CATALOGUE
+from gecar.world.robot import load_robot
 
 FOUR = ("viscous_friction", "rotor_inertia", "track_width", "wheel_radius")
 RESPONSES = {effect: bumps(seed, 4, 1.0) for seed, effect in enumerate(FOUR, start=1)}
@@ -116,6 +117,12 @@ def test_worth_a_name_is_what_moves_the_robot_by_a_material_amount() -> None:
     assert shares["com_height"] >= 0.6
     assert max(shares.values()) <= 1.0
     assert worth_a_name(sizes, Material(500.0), EV3, ("track_width",)) == {"track_scale": 1.0}
+
+
+def test_worth_a_name_is_told_of_what_another_body_bounds_too() -> None:
+    spike = load_robot("spike")
+    sizes = sizes_of([recorded(spike, seed) for seed in range(3)])
+    assert 0.15 <= worth_a_name(sizes, Material(1.0), spike, ("com_offset",))["com_ahead"] < 1.0
 
 
 def test_recordings_set_aside_count_in_what_an_effect_does() -> None:

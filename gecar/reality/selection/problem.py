@@ -234,10 +234,10 @@ def worth_a_name(
     """
     small, changed = [], []
     for effect in catalogue:
-        parameters = free(robot, (effect,))
+        parameters, fields = free(robot, (effect,)), {p.field for p in _small(effect)}
         sides = np.where(parameters.bounds[1] >= 1.0, 1.0, -1.0)
         for alone, c in zip(np.diag(sides), parameters.coordinates, strict=True):
-            if c.parameter in _small(effect):
+            if c.parameter.field in fields:
                 small.append(c.parameter)
                 changed.append(parameters.physics(alone))
     out = {}
