@@ -59,6 +59,9 @@ class LinearResiduals:
     def with_clock_offsets(self, offsets_s: np.ndarray) -> LinearResiduals:
         return self  # no camera
 
+    def later(self, seconds: float) -> LinearResiduals:
+        return self  # no steps
+
     @property
     def index(self) -> ResidualIndex:
         rows = len(self.noise) // self.count

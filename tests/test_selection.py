@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,10 +23,32 @@ from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, share_asked_for
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.selection.thresholds import table
+from gecar.world.rollout import STEP_S
 
+CLOCK = "clock_skew"
 YAW_RATE = CHANNELS.index("yaw_rate")
 VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
 RESPONSES = {VISCOUS: bumps(1, 4, 1.0), INERTIA: bumps(2, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
+
+
+@dataclass(frozen=True)
+class SteppedResiduals(LinearResiduals):
+    """Residuals that ask for an effect where the simulation's steps fall as they do, and for its opposite between."""
+
+    def later(self, seconds: float) -> SteppedResiduals:
+        side = np.cos(2.0 * np.pi * seconds / STEP_S)
+        return replace(self, truth={effect: side * size for effect, size in self.truth.items()})
+
+
+def test_a_clock_that_fits_only_as_the_steps_fall_is_no_candidate() -> None:
+    responses, truth = {CLOCK: bumps(1, 4, 1.0)}, {CLOCK: 2.0}
+    always, stepped = linear(truth, responses), linear(truth, responses)
+    stepped = SteppedResiduals(**vars(stepped))
+    for residuals, taken in ((always, [CLOCK]), (stepped, [])):
+        problem = linear_problem(residuals)
+        stage = candidate_steps(problem, problem.known)
+        assert stage[0].gain > 100.0
+        assert [step.effect for step in candidates(problem, stage)] == taken
 
 
 def test_white_noise_has_no_excess_energy_and_a_slow_misfit_has_all_of_its_own() -> None:

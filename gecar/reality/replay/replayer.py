@@ -134,6 +134,13 @@ class Replayer:
         pose = axle_pose(self.poses_seen, mark)
         return replace(self, inputs=self.inputs._replace(pose=pose), start=_first_pose(pose))
 
+    def later(self, seconds: float) -> Replayer:
+        """Return this with all times later by so much [s], so that steps of the simulation fall between others."""
+        t, command_t, pose_t = (
+            times + seconds for times in (self.inputs.t, self.inputs.command_t, self.inputs.pose_t)
+        )
+        return replace(self, inputs=self.inputs._replace(t=t, command_t=command_t, pose_t=pose_t))
+
     def open_loop(self) -> Replayer:
         """Return this to be replayed whole, never re-based on what was measured."""
         return replace(self, inputs=self.inputs._replace(memory=np.inf))

@@ -142,6 +142,11 @@ class Residuals:
         changed = [r.with_nuisances(replace(r.nuisances, mark=(ahead, left, turn))) for r in self.recordings]
         return replace(self, recordings=tuple(changed))
 
+    def later(self, seconds: float) -> Residuals:
+        """Return these with the simulation begun so much before the recordings [s]."""
+        changed = [replace(r, replayer=r.replayer.later(seconds)) for r in self.recordings]
+        return replace(self, recordings=tuple(changed))
+
     def localised(self, physics: Physics) -> Residuals:
         """Return these with start poses found from readings where no camera looked."""
         return replace(

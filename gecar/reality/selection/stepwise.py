@@ -15,6 +15,7 @@ from gecar.reality.materiality import Size
 from gecar.reality.selection.acceptance import (
     at_a_bound,
     candidates,
+    imitates_a_step,
     imitates_dry_friction,
     is_material,
     proved,
@@ -302,6 +303,7 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
                 proved(step)
                 and not stopped(step, own=problem.on_bench)
                 and not imitates_dry_friction(problem, swapped)
+                and not imitates_a_step(problem, step)
             ):
                 return step
     return None
