@@ -226,7 +226,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             valleys(motion.explained.problem, motion.explained.taken)
             if motion.explained.problem.on_bench
             else (),
-            motion.encoders_left_out,
+            motion.left_out,
             [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen],
             context.split,
         ),
@@ -262,14 +262,14 @@ class _Stage(Confirmation):
         95 % intervals of the effects' parameters, by effect and label.
     laws, invented
         The laws, and what the verdict says of them.
-    encoders_left_out
-        Whether the encoders were left out, as nothing explains them.
+    left_out
+        Encoders or poses, where nothing explains those, so that they were left out.
     """
 
     spans: Mapping[str, Mapping[str, Interval]]
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
-    encoders_left_out: bool = False
+    left_out: str = ""
 
 
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
@@ -281,31 +281,36 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell, held)
     motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
     if motion.explained.unexplained and not motion.laws:
-        motion = _without_encoders(context, fitted, held) or motion
+        motion = (
+            _explained_from(context, "poses", fitted, held)
+            or _explained_from(context, "encoders", fitted, held)
+            or motion
+        )
     if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
 
 
-def _without_encoders(context: _Context, fitted: Residuals, held: Residuals) -> _Stage | None:
-    """Explain the poses alone, where encoders have something that nothing explains; None where that explains nothing.
+def _explained_from(context: _Context, kept: str, fitted: Residuals, held: Residuals) -> _Stage | None:
+    """Explain poses or encoders alone, where the others have something that nothing explains; None if that fails.
 
-    An encoder that errs in a way of its own would otherwise hide what the poses show, as it counts in every sample.
+    An instrument that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
     """
-    blind = tuple(residuals.without_encoders() for residuals in (fitted, held))
-    if not blind[0].recordings or not any(r.replayer.has_poses for r in fitted.recordings):
+    alone, beside = (r.of_poses() if kept == "poses" else r.of_encoders() for r in (fitted, held))
+    if not alone.recordings or not any(r.replayer.has_poses for r in fitted.recordings):
         return None
-    context.tell("much is unexplained: once more without the encoders")
-    catalogue = observable(context.catalogue, blind[0])
+    context.tell(f"much is unexplained: once more with the {kept} alone")
+    catalogue = observable(context.catalogue, alone)
     problem = problem_of(
-        blind[0], context.robot, catalogue, context.material, context.seed, context.tell, blind[1]
+        alone, context.robot, catalogue, context.material, context.seed, context.tell, beside
     )
-    motion = _with_intervals(context, explained_and_confirmed(problem, blind[1]))
+    motion = _with_intervals(context, explained_and_confirmed(problem, beside))
     if not motion.explained.steps or motion.explained.unexplained:
         return None
     left = problem.sizes.of(fitted).left(motion.explained.taken.physics)
+    left_out = "encoders" if kept == "poses" else "poses"
     return replace(
-        motion, explained=replace(motion.explained, left=left, unexplained=True), encoders_left_out=True
+        motion, explained=replace(motion.explained, left=left, unexplained=True), left_out=left_out
     )
 
 

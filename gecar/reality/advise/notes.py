@@ -11,6 +11,13 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
 
+LEFT_OUT = {
+    "encoders": "The encoders have an error of their own, which no effect of the catalogue explains. They were left "
+    "out: what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles.",
+    "poses": "The poses have an error of their own, which no effect of the catalogue explains. They were left out: "
+    "what was found explains how the wheels turned. Check whether the camera was moved, and its frame.",
+}
+
 
 def notes_on(
     split: Split,
@@ -19,7 +26,7 @@ def notes_on(
     doubted: bool,
     candidates: Sequence[str] = (),
     alike: Sequence[Sequence[str]] = (),
-    encoders_left_out: bool = False,
+    left_out: str = "",
     unseen: Sequence[str] = (),
     as_logged: Split | None = None,
 ) -> tuple[str, ...]:
@@ -39,8 +46,8 @@ def notes_on(
         Effects accepted on the recordings fitted on, and not confirmed by those set aside.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
-    encoders_left_out
-        Whether the encoders were left out, as nothing explains them.
+    left_out
+        Encoders or poses, where nothing explains those, so that they were left out.
     unseen
         Effects found that the recordings set aside do not show.
     as_logged
@@ -57,11 +64,8 @@ def notes_on(
         for effect in unseen
     ]
     notes += _log_faults(split, as_logged or split)
-    if encoders_left_out:
-        notes.append(
-            "The encoders have an error of their own, which no effect of the catalogue explains. They were left out: "
-            "what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles."
-        )
+    if left_out:
+        notes.append(LEFT_OUT[left_out])
     notes += [
         f"These recordings hardly tell {', '.join(together[:-1])} and {together[-1]} apart: more of one with less of "
         "another fits about as well. The intervals say how far."

@@ -7,6 +7,7 @@ along the measured path.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -76,10 +77,10 @@ class RecordingResiduals:
             replayer = replayer.with_mark(nuisances.mark)
         return replace(self, replayer=replayer, nuisances=nuisances)
 
-    def without_encoders(self) -> RecordingResiduals:
-        """Return this without what the encoders measured, and without nuisances."""
-        unseen = np.full(len(self.recording.t_s), np.nan)
-        recording = replace(self.recording, left_angle_rad=unseen, right_angle_rad=unseen)
+    def without(self, columns: Sequence[str]) -> RecordingResiduals:
+        """Return this without what was measured in some columns of the recording, and without nuisances."""
+        unseen: dict[str, Any] = dict.fromkeys(columns, np.full(len(self.recording.t_s), np.nan))
+        recording = replace(self.recording, **unseen)
         return residuals_of(recording, self.noise, self.replayer.inputs.memory, self.course)
 
     def localised(self, physics: Physics) -> RecordingResiduals:

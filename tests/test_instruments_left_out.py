@@ -1,4 +1,4 @@
-"""Encoders with an error that no effect explains hide nothing of what the path shows."""
+"""Encoders or a camera with an error that no effect explains hide nothing of what the other shows."""
 
 from __future__ import annotations
 
@@ -37,4 +37,30 @@ def test_a_narrow_track_is_found_beside_encoders_that_jump_and_these_stay_unexpl
 
 def test_encoders_that_jump_alone_are_unexplained_and_nothing_is_named() -> None:
     verdict = discover(Case("made", tuple(jumping(EV3, seed) for seed in range(5))))
+    assert (verdict.verdict, verdict.effects) == ("unexplained", ())
+
+
+def knocked(robot: Robot, seed: int) -> Recording:
+    """Return a drive whose camera is knocked in its middle, by 4 cm and six degrees, in a direction of its own."""
+    run, rng = recorded(robot, seed), np.random.default_rng(seed)
+    late = run.t_s > rng.uniform(2.0, 6.0)
+    way, turn = rng.uniform(-np.pi, np.pi), rng.choice([-0.1, 0.1])
+    cos, sin = np.where(late, np.cos(turn), 1.0), np.where(late, np.sin(turn), 0.0)
+    x = run.x_m * cos - run.y_m * sin + 0.04 * np.cos(way) * late
+    y = run.x_m * sin + run.y_m * cos + 0.04 * np.sin(way) * late
+    return replace(run, x_m=x, y_m=y, heading_rad=run.heading_rad + turn * late)
+
+
+def test_friction_is_found_beside_a_camera_that_is_knocked_and_this_stays_unexplained() -> None:
+    robot = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.002}})
+    verdict = discover(Case("made", tuple(knocked(robot, seed) for seed in range(5))))
+    assert verdict.verdict == "missing_and_unexplained"
+    (found,) = verdict.effects
+    assert found.id == "viscous_friction"
+    assert found.parameters["coefficient_nms"].value == pytest.approx(0.002, abs=2e-4)
+    assert "The poses have an error of their own" in " ".join(verdict.notes)
+
+
+def test_a_knocked_camera_alone_is_unexplained_and_nothing_is_named() -> None:
+    verdict = discover(Case("made", tuple(knocked(EV3, seed) for seed in range(5))))
     assert (verdict.verdict, verdict.effects) == ("unexplained", ())
