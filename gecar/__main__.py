@@ -15,7 +15,10 @@ def main() -> None:
     """Run the command line; exit code 0, 2 for a bad input, 130 for Ctrl-C, 1 for a fault of gecar's own."""
     _print_anywhere()
     try:
-        from gecar.cli.application import application  # noqa: PLC0415  an interrupt while importing is caught too
+        from gecar.parallel.signals import remember_interrupts  # noqa: PLC0415  an interrupt now is caught, too
+
+        remember_interrupts()
+        from gecar.cli.application import application  # noqa: PLC0415
 
         application()()
     except InputError as error:

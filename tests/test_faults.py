@@ -7,13 +7,16 @@ import random
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from test_results import SHORT, outputs
 
 from gecar.errors import InputError
+from gecar.parallel.signals import raise_if_interrupted, remember_interrupts
 from gecar.results.config import configure
 from gecar.results.run import finish, resume, start
 
@@ -113,3 +116,22 @@ def test_damage_is_refused_in_one_line_or_changes_nothing(name, damage, whole, t
         else:
             found = outputs(out)
             assert all(found[key] == expected[key] for key in ("history", "result", "best"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_an_interrupt_that_something_dropped_is_raised_at_the_next_turn() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        remember_interrupts()
+        raise_if_interrupted()  # nothing yet
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+        with pytest.raises(KeyboardInterrupt):
+            raise_if_interrupted()
+        raise_if_interrupted()  # once answered it is over
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        remember_interrupts()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)

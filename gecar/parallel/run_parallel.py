@@ -16,6 +16,7 @@ from typing import TypeVar
 
 from gecar.errors import InputError
 from gecar.parallel.executors import MAX_DEATHS, QUIET_S, open_executor, side_by_side
+from gecar.parallel.signals import raise_if_interrupted
 
 Key = TypeVar("Key")
 Argument = TypeVar("Argument")
@@ -83,6 +84,7 @@ def as_they_end(
             going[executor.submit(function, argument)] = key
         if not going:
             return
+        raise_if_interrupted()
         done = wait(going, QUIET_S, FIRST_COMPLETED).done
         why = "" if told or done else getattr(executor, "why_waiting", str)()
         if why:

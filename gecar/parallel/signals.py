@@ -1,4 +1,4 @@
-"""Signals and worker processes: Ctrl-C is the parent's business, and no worker outlives its parent."""
+"""Signals and worker processes: Ctrl-C is the parent's business and is not lost, and no worker outlives its parent."""
 
 from __future__ import annotations
 
@@ -9,6 +9,31 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+_interrupted = threading.Event()
+
+
+def remember_interrupts() -> None:
+    """Remember a Ctrl-C, besides raising `KeyboardInterrupt`, for `raise_if_interrupted`.
+
+    An extension module may drop the exception if it comes while the module asks Python for something, as many do while
+    they are imported; once a run went on. A Ctrl-C that the shell has this process ignore stays ignored.
+    """
+
+    def remember(number: int, frame: FrameType | None) -> None:
+        _interrupted.set()
+        signal.default_int_handler(number, frame)
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, remember)
+
+
+def raise_if_interrupted() -> None:
+    """Raise `KeyboardInterrupt` if there was a Ctrl-C that nobody has answered; for what goes round and round."""
+    if _interrupted.is_set():
+        _interrupted.clear()
+        raise KeyboardInterrupt
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from gecar.language.opcodes import MAX_DUTY_PCT
 from gecar.language.program import Program, parse_program
 from gecar.language.robot_language import check_robot_language
 from gecar.parallel.executors import open_executor, side_by_side
+from gecar.parallel.signals import raise_if_interrupted
 from gecar.results.arrival import arrives
 from gecar.results.autosave import Saver
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
@@ -243,6 +244,7 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
     def saved(generation: Generation) -> None:
         saver()
         after(generation)
+        raise_if_interrupted()
 
     try:
         if not evolution.finished:
