@@ -43,7 +43,7 @@ from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.acceptance import size_of
+from gecar.reality.selection.acceptance import size_of, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
@@ -305,9 +305,14 @@ def _explained_from(context: _Context, kept: str, fitted: Residuals, held: Resid
         alone, context.robot, catalogue, context.material, context.seed, context.tell, beside
     )
     motion = _with_intervals(context, explained_and_confirmed(problem, beside))
+    taken, whole = motion.explained.taken, problem.sizes.of(fitted)
     if not motion.explained.steps or motion.explained.unexplained:
         return None
-    left = problem.sizes.of(fitted).left(motion.explained.taken.physics)
+    if worsens(
+        problem, problem.known, taken, whole
+    ):  # a cause does not part the others from the robot, either
+        return None
+    left = whole.left(taken.physics)
     left_out = "encoders" if kept == "poses" else "poses"
     return replace(
         motion, explained=replace(motion.explained, left=left, unexplained=True), left_out=left_out

@@ -86,9 +86,9 @@ LEFT_SHARE = Threshold(
 )
 
 MEASURED = Threshold(
-    2.0,
+    1.3,
     "times the limit of what is material that the remaining error must exceed, because it includes measurement errors",
-    "hand",
+    "59 cases of three worlds with nothing concealed: 57 stayed below 1.1, the others at 1.4 and 1.6",
 )
 
 WORSE = Threshold(
