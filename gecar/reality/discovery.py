@@ -41,7 +41,7 @@ from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
-from gecar.reality.residuals.of_case import Residuals, motion_residuals
+from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of, worsens
 from gecar.reality.selection.alternatives import alternatives
@@ -281,42 +281,41 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell, held)
     motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
     if motion.explained.unexplained and not motion.laws:
-        motion = (
-            _explained_from(context, "poses", fitted, held)
-            or _explained_from(context, "encoders", fitted, held)
-            or motion
-        )
+        others = (_explained_without(context, each, fitted, held) for each in INSTRUMENTS)
+        motion = next(filter(None, others), motion)
     if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
 
 
-def _explained_from(context: _Context, kept: str, fitted: Residuals, held: Residuals) -> _Stage | None:
-    """Explain poses or encoders alone, where the others have something that nothing explains; None if that fails.
+def _explained_without(
+    context: _Context, instrument: str, fitted: Residuals, held: Residuals
+) -> _Stage | None:
+    """Explain motion without the encoders, or without the poses, where nothing explains those; None if that fails.
 
-    An instrument that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
+    One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
     """
-    alone, beside = (r.of_poses() if kept == "poses" else r.of_encoders() for r in (fitted, held))
-    if not alone.recordings or not any(r.replayer.has_poses for r in fitted.recordings):
+    if not any(set(INSTRUMENTS[instrument]) & set(r.recording.measured) for r in fitted.recordings):
         return None
-    context.tell(f"much is unexplained: once more with the {kept} alone")
+    alone, beside = (residuals.without(instrument) for residuals in (fitted, held))
+    if not alone.recordings:
+        return None
+    context.tell(f"much is unexplained: once more without the {instrument}")
     catalogue = observable(context.catalogue, alone)
     problem = problem_of(
         alone, context.robot, catalogue, context.material, context.seed, context.tell, beside
     )
     motion = _with_intervals(context, explained_and_confirmed(problem, beside))
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
-    if not motion.explained.steps or motion.explained.unexplained:
+    # What is left out may be off, but a cause does not take the robot farther from it.
+    if (
+        not motion.explained.steps
+        or motion.explained.unexplained
+        or worsens(problem, problem.known, taken, whole)
+    ):
         return None
-    if worsens(
-        problem, problem.known, taken, whole
-    ):  # a cause does not part the others from the robot, either
-        return None
-    left = whole.left(taken.physics)
-    left_out = "encoders" if kept == "poses" else "poses"
-    return replace(
-        motion, explained=replace(motion.explained, left=left, unexplained=True), left_out=left_out
-    )
+    explained = replace(motion.explained, left=whole.left(taken.physics), unexplained=True)
+    return replace(motion, explained=explained, left_out=instrument)
 
 
 def _explain_sensor(

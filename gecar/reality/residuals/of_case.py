@@ -29,8 +29,8 @@ Physics = npt.NDArray[Any]
 
 GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: within 2 %, 0.6 deg/s, 10 ms
 ENCODER_WAVE_RAD = math.radians(1.0)  # as much as such an encoder's resolution
-ENCODERS = ("left_angle_rad", "right_angle_rad")
-POSES = ("x_m", "y_m", "heading_rad")
+# Which tell motion each by itself, and their fields of a recording.
+INSTRUMENTS = {"encoders": ("left_angle_rad", "right_angle_rad"), "poses": ("x_m", "y_m", "heading_rad")}
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
@@ -125,17 +125,14 @@ class Residuals:
         """Return the residuals of some of the recordings, by their numbers."""
         return replace(self, recordings=tuple(self.recordings[k] for k in numbers))
 
-    def of_poses(self) -> Residuals:
-        """Return these of the recordings with poses, without what their encoders measured and without nuisances."""
-        seen = [run for run in self.recordings if run.replayer.has_poses]
-        return replace(self, recordings=tuple(run.without(ENCODERS) for run in seen))
+    def without(self, instrument: str) -> Residuals:
+        """Return these without what encoders or poses measured, and without nuisances, where there is the other.
 
-    def of_encoders(self) -> Residuals:
-        """Return these of the recordings with both encoders, without the poses seen and without nuisances."""
-        counted = [
-            run for run in self.recordings if not np.isnan(run.replayer.measured[:, :2]).all(axis=0).any()
-        ]
-        return replace(self, recordings=tuple(run.without(POSES) for run in counted))
+        ``instrument`` is one of `INSTRUMENTS`.
+        """
+        (others,) = (fields for name, fields in INSTRUMENTS.items() if name != instrument)
+        there = [run for run in self.recordings if not set(others).isdisjoint(run.recording.measured)]
+        return replace(self, recordings=tuple(run.without(INSTRUMENTS[instrument]) for run in there))
 
     def with_clock_offsets(self, offsets_s: Array) -> Residuals:
         """Return these with other camera clocks, shape (recordings,) [s]."""
