@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -24,22 +25,6 @@ def jumping(robot: Robot, seed: int) -> Recording:
     return replace(run, left_angle_rad=angles[0], right_angle_rad=angles[1])
 
 
-def test_a_narrow_track_is_found_beside_encoders_that_jump_and_these_stay_unexplained() -> None:
-    robot = EV3.with_effects({"track_width": {"scale": 0.93}})
-    verdict = discover(Case("made", tuple(jumping(robot, seed) for seed in range(5))))
-    assert verdict.verdict == "missing_and_unexplained"
-    (found,) = verdict.effects
-    assert found.id == "track_width"
-    assert found.parameters["scale"].value == pytest.approx(0.93, abs=0.003)
-    assert "The encoders have an error of their own" in " ".join(verdict.notes)
-    assert verdict.residual.material
-
-
-def test_encoders_that_jump_alone_are_unexplained_and_nothing_is_named() -> None:
-    verdict = discover(Case("made", tuple(jumping(EV3, seed) for seed in range(5))))
-    assert (verdict.verdict, verdict.effects) == ("unexplained", ())
-
-
 def knocked(robot: Robot, seed: int) -> Recording:
     """Return a drive whose camera is knocked in its middle, by 4 cm and six degrees, in a direction of its own."""
     run, rng = recorded(robot, seed), np.random.default_rng(seed)
@@ -51,16 +36,35 @@ def knocked(robot: Robot, seed: int) -> Recording:
     return replace(run, x_m=x, y_m=y, heading_rad=run.heading_rad + turn * late)
 
 
-def test_friction_is_found_beside_a_camera_that_is_knocked_and_this_stays_unexplained() -> None:
-    robot = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.002}})
-    verdict = discover(Case("made", tuple(knocked(robot, seed) for seed in range(5))))
+@pytest.mark.parametrize(
+    ("damaged", "instrument", "effect", "label", "value", "within"),
+    [
+        (jumping, "encoders", "track_width", "scale", 0.93, 0.003),
+        (knocked, "poses", "viscous_friction", "coefficient_nms", 0.002, 2e-4),
+    ],
+    ids=["encoders", "poses"],
+)
+def test_an_effect_is_found_beside_an_instrument_that_errs_and_this_stays_unexplained(
+    damaged: Callable[[Robot, int], Recording],
+    instrument: str,
+    effect: str,
+    label: str,
+    value: float,
+    within: float,
+) -> None:
+    robot = EV3.with_effects({effect: {label: value}})
+    verdict = discover(Case("made", tuple(damaged(robot, seed) for seed in range(5))))
     assert verdict.verdict == "missing_and_unexplained"
     (found,) = verdict.effects
-    assert found.id == "viscous_friction"
-    assert found.parameters["coefficient_nms"].value == pytest.approx(0.002, abs=2e-4)
-    assert "The poses have an error of their own" in " ".join(verdict.notes)
+    assert found.id == effect
+    assert found.parameters[label].value == pytest.approx(value, abs=within)
+    assert f"The {instrument} have an error of their own" in " ".join(verdict.notes)
+    assert verdict.residual.material
 
 
-def test_a_knocked_camera_alone_is_unexplained_and_nothing_is_named() -> None:
-    verdict = discover(Case("made", tuple(knocked(EV3, seed) for seed in range(5))))
+@pytest.mark.parametrize("damaged", [jumping, knocked])
+def test_an_instrument_that_errs_alone_is_unexplained_and_nothing_is_named(
+    damaged: Callable[[Robot, int], Recording],
+) -> None:
+    verdict = discover(Case("made", tuple(damaged(EV3, seed) for seed in range(5))))
     assert (verdict.verdict, verdict.effects) == ("unexplained", ())

@@ -1,8 +1,7 @@
-"""Signals and worker processes: Ctrl-C is the parent's business and is not lost, and no worker outlives its parent."""
+"""Signals and worker processes: the parent alone answers Ctrl-C, always, and no worker outlives its parent."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import sys
@@ -15,7 +14,7 @@ _interrupted = threading.Event()
 
 
 def remember_interrupts() -> None:
-    """Remember a Ctrl-C, besides raising `KeyboardInterrupt`, for `raise_if_interrupted`.
+    """Let a Ctrl-C raise `KeyboardInterrupt`, as usual, and remember it for `raise_if_interrupted`.
 
     An extension module may drop the exception if it comes while the module asks Python for something, as many do while
     they are imported; once a run went on. A Ctrl-C that the shell has this process ignore stays ignored.
@@ -30,7 +29,7 @@ def remember_interrupts() -> None:
 
 
 def raise_if_interrupted() -> None:
-    """Raise `KeyboardInterrupt` if there was a Ctrl-C that nobody has answered; for what goes round and round."""
+    """Raise `KeyboardInterrupt` if a Ctrl-C is remembered; to be called in every turn of a long loop."""
     if _interrupted.is_set():
         _interrupted.clear()
         raise KeyboardInterrupt
@@ -59,6 +58,8 @@ def start_worker() -> None:
 
 
 def _end_with_parent() -> None:
+    import multiprocessing  # noqa: PLC0415  every command imports this module first
+
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

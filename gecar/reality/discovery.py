@@ -275,10 +275,9 @@ class _Stage(Confirmation):
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
     """Explain how the robot moved: by effects, by effects and laws, or by laws alone.
 
-    If none of these does, the encoders may be wrong, or what is left may be at one place on the floor.
+    If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
     """
-    catalogue = observable(context.catalogue, fitted)
-    problem = problem_of(fitted, context.robot, catalogue, context.material, context.seed, context.tell, held)
+    problem = _problem(context, context.robot, fitted, held)
     motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
     if motion.explained.unexplained and not motion.laws:
         others = (_explained_without(context, each, fitted, held) for each in INSTRUMENTS)
@@ -295,16 +294,12 @@ def _explained_without(
 
     One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
     """
-    if not any(set(INSTRUMENTS[instrument]) & set(r.recording.measured) for r in fitted.recordings):
-        return None
+    measured = {name for run in fitted.recordings for name in run.recording.measured}
     alone, beside = (residuals.without(instrument) for residuals in (fitted, held))
-    if not alone.recordings:
+    if measured.isdisjoint(INSTRUMENTS[instrument]) or not alone.recordings:
         return None
     context.tell(f"much is unexplained: once more without the {instrument}")
-    catalogue = observable(context.catalogue, alone)
-    problem = problem_of(
-        alone, context.robot, catalogue, context.material, context.seed, context.tell, beside
-    )
+    problem = _problem(context, context.robot, alone, beside)
     motion = _with_intervals(context, explained_and_confirmed(problem, beside))
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
     # What is left out may be off, but a cause does not take the robot farther from it.
@@ -318,6 +313,12 @@ def _explained_without(
     return replace(motion, explained=explained, left_out=instrument)
 
 
+def _problem(context: _Context, robot: Robot, fitted: Residuals, held: Residuals) -> Problem:
+    """Return the selection problem of residuals, with the effects of the catalogue that they can show."""
+    catalogue = observable(context.catalogue, fitted)
+    return problem_of(fitted, robot, catalogue, context.material, context.seed, context.tell, held)
+
+
 def _explain_sensor(
     context: _Context, motion: Explanation, fitted: Residuals, held: Residuals
 ) -> _Stage | None:
@@ -327,9 +328,8 @@ def _explain_sensor(
         return None
     # A late camera and a skewed clock shift what is read, too.
     known = motion.taken.parameters.robot.with_effects(motion.taken.values)
-    catalogue = observable(context.catalogue, residuals)
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
-    problem = problem_of(residuals, known, catalogue, context.material, context.seed, context.tell, beside)
+    problem = _problem(context, known, residuals, beside)
     seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     seen = with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), beside)

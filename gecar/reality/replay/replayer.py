@@ -135,7 +135,7 @@ class Replayer:
         return replace(self, inputs=self.inputs._replace(pose=pose), start=_first_pose(pose))
 
     def later(self, seconds: float) -> Replayer:
-        """Return this with all times later by so much [s], so that steps of the simulation fall between others."""
+        """Return this with all times later by so much [s]: part of a step moves where steps fall among the rows."""
         t, command_t, pose_t = (
             times + seconds for times in (self.inputs.t, self.inputs.command_t, self.inputs.pose_t)
         )

@@ -29,7 +29,7 @@ Physics = npt.NDArray[Any]
 
 GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: within 2 %, 0.6 deg/s, 10 ms
 ENCODER_WAVE_RAD = math.radians(1.0)  # as much as such an encoder's resolution
-# Which tell motion each by itself, and their fields of a recording.
+# Each tells motion by itself; with their fields of a recording.
 INSTRUMENTS = {"encoders": ("left_angle_rad", "right_angle_rad"), "poses": ("x_m", "y_m", "heading_rad")}
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
@@ -126,9 +126,9 @@ class Residuals:
         return replace(self, recordings=tuple(self.recordings[k] for k in numbers))
 
     def without(self, instrument: str) -> Residuals:
-        """Return these without what encoders or poses measured, and without nuisances, where there is the other.
+        """Return these without what one of `INSTRUMENTS` measured and without nuisances.
 
-        ``instrument`` is one of `INSTRUMENTS`.
+        Recordings without the other one are left out.
         """
         (others,) = (fields for name, fields in INSTRUMENTS.items() if name != instrument)
         there = [run for run in self.recordings if not set(others).isdisjoint(run.recording.measured)]
@@ -149,7 +149,7 @@ class Residuals:
         return replace(self, recordings=tuple(changed))
 
     def later(self, seconds: float) -> Residuals:
-        """Return these with the simulation begun so much before the recordings [s]."""
+        """Return these with simulations that begin so much earlier than the recordings [s]."""
         changed = [replace(r, replayer=r.replayer.later(seconds)) for r in self.recordings]
         return replace(self, recordings=tuple(changed))
 

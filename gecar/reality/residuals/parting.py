@@ -71,7 +71,7 @@ class Sizes:
         return self.apart_of_each(one, [other])[0]
 
     def apart_of_each(self, one: Physics, others: Sequence[Physics]) -> list[Size]:
-        """Return the same of one robot and each of several others."""
+        """Return how far one robot parts from each of several others, as `apart` does from one."""
         of = _reading_apart if self.sensor else _apart
         parts = [of(run, one, others) for run in (*self.runs, *self.beside)]
         return [combined([part[k] for part in parts]) for k in range(len(others))]

@@ -112,7 +112,7 @@ def imitates_dry_friction(problem: Problem, model: Model) -> bool:
 
 
 def imitates_a_step(problem: Problem, step: Step) -> bool:
-    """Whether an effect gains by where the simulation's steps fall among the commands, and not by what it is.
+    """Whether an effect gains only because of where the simulation's steps fall among the commands.
 
     When a tyre slips or holds again is known to a step only, and what follows depends on it. A clock that is slightly
     fast moves commands and steps against each other, so that some rate of it fits by chance: in one case with nothing
@@ -120,8 +120,8 @@ def imitates_a_step(problem: Problem, step: Step) -> bool:
     """
     if not any(p.field in TIMING for p in BY_ID[step.effect].parameters):
         return False
-    gains = []
-    for later in map(problem.residuals.later, STEP_S * np.arange(PHASES) / PHASES):
+    gains = [step.gain]
+    for later in map(problem.residuals.later, STEP_S * np.arange(1, PHASES) / PHASES):
         before, after = (
             problem.estimator.cost_of(later.errors(model.physics)) for model in (step.base, step.model)
         )
