@@ -27,7 +27,7 @@ from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_o
 from gecar.reality.selection import cross_validation, stepwise
 from gecar.reality.selection.acceptance import is_worthwhile
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.stepwise import Explanation, concluded
 from gecar.reality.selection.thresholds import MOST_EFFECTS
 from gecar.reality.uncertainty.intervals import NORMAL_95, deviations
 from gecar.reality.verdict import NextRecording
@@ -41,7 +41,7 @@ START_S = 1.0  # over which an open-loop replay's start pose is fitted
 
 
 def by_bic(problem: Problem) -> Explanation:
-    """Take the effect that lowers BIC most, as long as one does (Schwarz 1978); it has no way to abstain.
+    """Take the effect that lowers BIC most, as long as one does (Schwarz 1978).
 
     Effects are screened as `gecar` screens them: only the criterion differs.
     """
@@ -54,16 +54,7 @@ def by_bic(problem: Problem) -> Explanation:
             break
         steps.append(best)
         model = best.model
-    return _explanation(problem, model, steps, tried)
-
-
-def _explanation(
-    problem: Problem, model: Model, steps: Sequence[Step], tried: Sequence[tuple[Step, ...]]
-) -> Explanation:
-    left = problem.sizes.left(model.physics)
-    return Explanation(
-        problem, model, tuple(steps), tuple(tried), left, unexplained=False, minor=(), whole=model
-    )
+    return concluded(problem, model, steps, tried)
 
 
 def _bic(model: Model) -> float:
@@ -106,7 +97,7 @@ def everything(problem: Problem) -> Explanation:
     seen = {c.effect.id for c, told in zip(model.parameters.coordinates, sure, strict=True) if told}
     named = [e for e in problem.catalogue if e in seen and is_worthwhile(model, e)]
     steps = [Step(e, problem.known, model, problem.known.cost - model.cost) for e in named]
-    return _explanation(problem, model, steps, ((),) * len(steps))
+    return concluded(problem, model, steps, ((),) * len(steps))
 
 
 def without_null(problem: Problem, step: Step) -> Step:
