@@ -1,4 +1,4 @@
-"""The command line: ``python -m benchmarks.concealed draw | plan | exam | run | score | best | drive | practice``."""
+"""The command line: ``python -m benchmarks.concealed COMMAND``; ``--help`` lists the commands."""
 
 from __future__ import annotations
 
@@ -78,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
         default=1.0,
         help="share of the usual duties; below 1, faster recordings are sealed beside each case",
     )
+    plan.add_argument(
+        "--without", choices=("light", "camera", "encoders"), default="", help="a sensor that no case has"
+    )
     plan.set_defaults(command=_plan)
 
     exam = commands.add_parser("exam", help="all of it: draw, seal, run, score, write the tables; resumes")
@@ -106,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     score.add_argument("--report", type=Path, help="Markdown file; a PNG of the same stem goes beside it")
     score.set_defaults(command=_score)
 
-    best = _best_parser(commands)
+    best, limits = _best_parser(commands), _limits_parser(commands)
 
     for command in (draw, plan, exam):
         command.add_argument(
@@ -131,13 +134,19 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_argument("--scheduler", default="", metavar="ADDRESS", help="Dask's scheduler")
 
-    for command in (draw, plan, exam, run, score, best):
+    for command in (draw, plan, exam, run, score, best, limits):
         command.add_argument(
             "--out", type=Path, default=Path("runs/concealed"), help="holds cases/ and sealed/"
         )
-    for command in (draw, plan, exam, run, score):
+    for command in (draw, plan, exam, run, score, limits):
         command.add_argument("--workers", type=int, default=os.cpu_count() or 1)
 
+    _add_others(commands)
+    return parser
+
+
+def _add_others(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Ask for what has nothing to do with an examination's folder."""
     drive = commands.add_parser("drive", help="drive a program round the course on a concealed robot")
     drive.add_argument("program", type=Path, help="JSON: opcode rows")
     drive.add_argument("--recording", type=Path, help="CSV file to write")
@@ -150,7 +159,6 @@ def _parser() -> argparse.ArgumentParser:
     practice = commands.add_parser("practice", help="replay the practice cases with their answers (minutes)")
     practice.add_argument("folder", type=Path)
     practice.set_defaults(command=_practice)
-    return parser
 
 
 def _best_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
@@ -159,6 +167,19 @@ def _best_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     best.add_argument("--others", type=int, default=10, help="cases whose backgrounds are taken (10)")
     best.set_defaults(command=_best)
     return best
+
+
+def _limits_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    limits = commands.add_parser(
+        "limits",
+        help="conceal effects at the limits that verdicts on empty cases state, in those cases' robots",
+    )
+    limits.add_argument("--verdicts", type=Path, required=True)
+    limits.add_argument("--to", type=Path, required=True, help="folder for the new cases")
+    limits.add_argument("--count", type=int, default=60, help="of effects to conceal, at most (60)")
+    limits.add_argument("--seed", type=int, default=0)
+    limits.set_defaults(command=_limits)
+    return limits
 
 
 def _ask_counts(parser: argparse.ArgumentParser) -> None:
@@ -195,7 +216,14 @@ def _plan(chosen: argparse.Namespace) -> int:
         message = f"--pace: found {chosen.pace}, expected 0.1 to 1"
         raise ValueError(message)
     background = chosen.background == "on"
-    cases = plan(chosen.seed, _by_world(chosen), background=background, last=chosen.last, pace=chosen.pace)
+    cases = plan(
+        chosen.seed,
+        _by_world(chosen),
+        background=background,
+        last=chosen.last,
+        pace=chosen.pace,
+        without=chosen.without,
+    )
     print(draw_all(cases, chosen.out, chosen.workers))
     return 0
 
@@ -303,6 +331,17 @@ def _best(chosen: argparse.Namespace) -> int:
     for name in chosen.case:
         alone, beside = d_prime_beside_backgrounds(chosen.out, name, chosen.others)
         print(f"{name:<10} {alone:8.1f} {beside:19.1f}", flush=True)
+    return 0
+
+
+def _limits(chosen: argparse.Namespace) -> int:
+    import numpy as np  # noqa: PLC0415
+
+    from benchmarks.concealed.at_limits import draw_at_limits, stated  # noqa: PLC0415
+
+    rng = np.random.default_rng(chosen.seed)
+    limits = stated(chosen.out, chosen.verdicts, chosen.count, rng)
+    print(draw_at_limits(chosen.out, limits, chosen.to, rng, chosen.workers))
     return 0
 
 

@@ -38,6 +38,7 @@ from benchmarks.concealed.worlds import truth
 
 KINDS = ("none", "single", "double", "triple", "mixed", "outside")
 ALL_OUTSIDE = {**OUTSIDE, **SEALED}
+SENSORS = {"light": {"reflection_pct"}, "camera": set(POSE), "encoders": set(ANGLES)}
 FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
@@ -62,11 +63,14 @@ class Manner:
     pace
         Share of the usual duties that the robot is driven with. Where it is less than 1, two recordings at the usual
         duties are sealed beside the case: what is learned from slow ones can be judged by faster ones.
+    without
+        A sensor that no case has, one of ``SENSORS``; all may be there if empty.
     """
 
     world: str = "mujoco"
     background: bool = False
     pace: float = 1.0
+    without: str = ""
 
 
 @dataclass(frozen=True)
@@ -138,20 +142,35 @@ def draw_case(
         except ToppledError:
             for path in folder.iterdir():
                 path.unlink()
+    seal_truth(sealed, name, kind, seed, hidden, case, worlds)
+
+
+def seal_truth(
+    folder: Path,
+    name: str,
+    kind: str,
+    seed: tuple[int, ...],
+    hidden: Hidden,
+    case: Case,
+    worlds: Mapping[str, Array],
+) -> None:
+    """Write what a recorded case conceals, the noise-free channels first and the label last, into a folder."""
+    manner, runs = case.manner, list(case.setting.runs)
     single: dict[str, Any] = {
         key: array.astype(np.float32) for key, array in worlds.items() if not key.endswith("_plain")
     }
-    np.savez_compressed(sealed / "truth.npz", **single)
-    runs = list(case.setting.runs)
+    np.savez_compressed(folder / "truth.npz", **single)
     about = {"case": name, "kind": kind, **hidden.label, "seed": list(seed)}
     about |= {"conditions": _stated(case.conditions), "runs": runs, "holdout": _holdout(len(runs))}
     about |= {"robot": _plain(hidden.robots[0])}
     if manner.pace != 1.0:
         about |= {"pace": manner.pace}
+    if manner.without:
+        about |= {"without": manner.without}
     if manner.background or manner.world != "mujoco":
         about |= {"world": manner.world, "setting": case.setting.as_label()}
         about |= _measured(hidden, case, worlds)
-    (sealed / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
+    (folder / "label.json").write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8", newline="\n")
 
 
 def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str, Array], list[Act]]:
@@ -176,7 +195,9 @@ def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str
     """
     things = tuple(effect["id"] for effect in label["effects"])
     things += (label["outside"]["id"],) if label["outside"] else ()
-    manner = Manner(label.get("world", "mujoco"), "background" in label, label.get("pace", 1.0))
+    manner = Manner(
+        label.get("world", "mujoco"), "background" in label, label.get("pace", 1.0), label.get("without", "")
+    )
     with np.load(out / "sealed" / label["case"] / "truth.npz") as archive:
         sealed = archive["run0_on"]
     for attempt in range(_ATTEMPTS):
@@ -217,14 +238,14 @@ def _recorded(
     if manner.background:
         setting = draw_setting(rng, "line" if _needed(effects) & {"reflection_pct"} else "holds")
         background = draw_background(rng, manner.world)
-        conditions = _conditions(rng, effects, len(setting.runs))
+        conditions = _conditions(rng, effects, len(setting.runs), manner.without)
         known = {name: number for part in background.recorder.values() for name, number in part.items()}
         known |= {"log_hz": setting.log_hz, "encoder_step_deg": setting.encoder_step_deg}
         case = Case(manner, setting, replace(conditions, **known), seeds.spawn(len(setting.runs)))
         hidden = _conceal_tuned(kind, effects, rng, background, case)
     else:
         hidden = conceal(effects, rng)
-        conditions = _conditions(rng, effects, len(RUNS))
+        conditions = _conditions(rng, effects, len(RUNS), manner.without)
         case = Case(manner, Setting(runs=RUNS), conditions, seeds.spawn(len(RUNS)))
     worlds: dict[str, Array] = {}
     for run, run_kind in enumerate(case.setting.runs):
@@ -472,11 +493,12 @@ def _at_pace(controller: Controller, pace: float) -> Controller:
     return slower
 
 
-def _conditions(rng: Rng, effects: Sequence[str], runs: int) -> Conditions:
+def _conditions(rng: Rng, effects: Sequence[str], runs: int, without: str) -> Conditions:
     """Draw how a case is recorded; what the hidden effect needs to show at all is never left out."""
     away = {"battery_v"} if rng.random() < 0.4 else set()
     away |= {"yaw_rate_dps"} if rng.random() < 0.7 else set()
     away |= _gap(float(rng.random())) - _needed(effects)
+    away = away - set().union(*SENSORS.values()) | SENSORS[without] if without else away
     offsets = tuple(float(offset) for offset in rng.uniform(-0.015, 0.015, runs))
     return Conditions(
         columns=tuple(name for name in CHANNELS if name not in away),
@@ -495,9 +517,9 @@ def _needed(effects: Sequence[str]) -> set[str]:
 
 def _gap(chance: float) -> set[str]:
     """Leave out one kind of sensor, in a quarter of the cases."""
-    for share, columns in ((0.10, {"reflection_pct"}), (0.18, set(POSE)), (0.25, set(ANGLES))):
+    for share, sensor in ((0.10, "light"), (0.18, "camera"), (0.25, "encoders")):
         if chance < share:
-            return columns
+            return SENSORS[sensor]
     return set()
 
 

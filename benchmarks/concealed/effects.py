@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.robot import NEUTRAL
+
 Rng = np.random.Generator
 Parameters = dict[str, dict[str, Any]]
 
@@ -187,6 +189,41 @@ def _line_shift(rng: Rng, least: float) -> Drawn:
     angle = _sign(rng) * strength(rng, 0.003, 0.015, least) if rng.random() < 0.5 else 0.0
     parameters = {"dx_m": value(dx, "m"), "dy_m": value(dy, "m"), "angle_rad": value(angle, "rad")}
     return Drawn({"line_shift": (dx, dy, angle)}, parameters)
+
+
+# More than one number says how large they are, where a limit states one.
+SEVERAL = (
+    "dead_band", "floor_tilt", "friction_asymmetry", "line_shift", "sensor_gain", "sensor_position",
+    "slippery_patch", "static_friction", "torque_ripple",
+)  # fmt: skip
+
+
+def at_size(effect: str, size: float, rng: Rng) -> Drawn:
+    """Return an effect that differs from neutral by so much, on a side that is drawn.
+
+    Parameters
+    ----------
+    effect
+        None of `SEVERAL`.
+    size
+        Difference from neutral, or, of a limit that is infinite where it is neutral, that limit; in the label's unit.
+    rng
+        Source of randomness.
+    """
+    drawn = EFFECTS[effect].draw(rng, 0.0)
+    (field, number), (label, about) = *drawn.changes.items(), *drawn.parameters.items()
+    neutral = getattr(NEUTRAL, field)
+    there = size if math.isinf(neutral) else neutral + math.copysign(size, number - neutral)
+    if there <= 0.0 < neutral:  # neither friction nor a height is negative
+        there = neutral + size
+    return Drawn({field: there}, {label: value(there, about["unit"])})
+
+
+def is_below(effect: str, parameters: Mapping[str, Mapping[str, float]], limit: float) -> bool:
+    """Say whether an effect of a label, none of `SEVERAL`, is weaker than a limit that a verdict states."""
+    ((field, _),) = EFFECTS[effect].draw(np.random.default_rng(0), 0.0).changes.items()
+    neutral, (about,) = getattr(NEUTRAL, field), parameters.values()
+    return about["value"] > limit if math.isinf(neutral) else abs(about["value"] - neutral) < limit
 
 
 _POSE = ("x_m", "y_m", "heading_deg")

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.effects import SEVERAL, is_below
 from benchmarks.concealed.history import Array
-from benchmarks.concealed.recording import CHANNELS
+from benchmarks.concealed.recording import CHANNELS, POSE
 from benchmarks.concealed.sizes import is_material
 
 LARGEST_SET = 4  # an `or` of more names than this names nothing
@@ -27,6 +28,8 @@ class Judged:
     given. ``d_prime``: per concealed thing. ``hits``: concealed effects named, each by a set of its own. ``covered``:
     for every parameter that could be compared, whether the interval holds the truth. ``gap_closed``: as the verdict
     has it, over the channels with a gap; ``gap_closed_over_all``: over all channels, those of noise alone as well.
+    ``camera``: whether poses were recorded. ``invisible``: whether the verdict says, of every concealed effect, that
+    these recordings would not show it, or not as little of it.
     ``world``, ``setting`` and ``sizes`` (per concealed thing, in mm, deg and %): as the label has them. Entries are
     nan, or empty, where a verdict or a label does not say.
     """
@@ -46,6 +49,8 @@ class Judged:
     world: str = "mujoco"
     setting: Mapping[str, Any] = field(default_factory=dict)
     sizes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    camera: bool = True
+    invisible: bool = False
 
     @property
     def material(self) -> bool:
@@ -132,6 +137,20 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
         world=label.get("world", "mujoco"),
         setting=label.get("setting", {}),
         sizes=label.get("size", {}),
+        camera=not set(POSE).isdisjoint(label["conditions"]["columns"]),
+        invisible=_invisible(label["effects"], verdict.get("limits") or {}),
+    )
+
+
+def _invisible(
+    concealed: Sequence[Mapping[str, Any]], limits: Mapping[str, Mapping[str, Any] | None]
+) -> bool:
+    """Check whether the limits stated leave room for all that is concealed; that of several numbers has no one size."""
+    stated = [(effect["id"], effect["parameters"], limits.get(effect["id"])) for effect in concealed]
+    return bool(stated) and all(
+        name in limits
+        and (limit is None or (name not in SEVERAL and is_below(name, numbers, float(limit["size"]))))
+        for name, numbers, limit in stated
     )
 
 

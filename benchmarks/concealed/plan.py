@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.concealed.cases import (
     ALL_OUTSIDE,
+    SENSORS,
     Manner,
     broken_seals,
     draw_case,
@@ -59,6 +60,7 @@ def plan(
     background: bool = False,
     last: bool = False,
     pace: float = 1.0,
+    without: str = "",
 ) -> list[Planned]:
     """List the cases of an examination.
 
@@ -74,6 +76,8 @@ def plan(
         Whether the kinds kept for the last examination are drawn, too.
     pace
         Share of the usual duties; see :class:`benchmarks.concealed.cases.Manner`.
+    without
+        A sensor that no case has; what it alone shows is not concealed.
 
     Returns
     -------
@@ -83,7 +87,7 @@ def plan(
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0)))
     contents: list[tuple[str, tuple[str, ...], Manner]] = []
     for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
-        manner = Manner(world, background, pace)
+        manner = Manner(world, background, pace, without)
         contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, last)]
     order = rng.permutation(len(contents))
     return [
@@ -107,14 +111,17 @@ def _contents(
     counts: Counts, rng: np.random.Generator, manner: Manner, last: bool
 ) -> list[tuple[str, tuple[str, ...]]]:
     """Say what the cases of one world conceal."""
-    kinds = outside_kinds(manner, last=last)
+    hidden = SENSORS.get(manner.without, set())
+    effects = [name for name, effect in EFFECTS.items() if hidden.isdisjoint(effect.needs)]
+    kinds = [name for name in outside_kinds(manner, last=last) if hidden.isdisjoint(ALL_OUTSIDE[name].needs)]
     contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
-    contents += [("single", (effect,)) for effect in _spread(EFFECTS, counts.single, rng)]
-    contents += [("double", _several(2, rng, alike=manner.background)) for _ in range(counts.double)]
+    contents += [("single", (effect,)) for effect in _spread(effects, counts.single, rng)]
+    for _ in range(counts.double):
+        contents.append(("double", _several(effects, 2, rng, alike=manner.background)))
     contents += [("outside", (kind,)) for kind in _spread(kinds, counts.outside, rng)]
-    contents += [("triple", _several(3, rng, alike=False)) for _ in range(counts.triple)]
+    contents += [("triple", _several(effects, 3, rng, alike=False)) for _ in range(counts.triple)]
     for kind in _spread(kinds, counts.mixed, rng):
-        contents.append(("mixed", (_several(1, rng, alike=False)[0], kind)))
+        contents.append(("mixed", (_several(effects, 1, rng, alike=False)[0], kind)))
     return contents
 
 
@@ -170,9 +177,8 @@ def _spread(names: Iterable[str], count: int, rng: np.random.Generator) -> list[
     return [order[place % len(order)] for place in range(count)]
 
 
-def _several(count: int, rng: np.random.Generator, *, alike: bool) -> tuple[str, ...]:
+def _several(names: Sequence[str], count: int, rng: np.random.Generator, *, alike: bool) -> tuple[str, ...]:
     """Draw effects that do not imitate each other; or, if wanted, in a third of the draws some that may."""
-    names = list(EFFECTS)
     may = alike and rng.random() < _ALIKE
     while True:
         drawn = tuple(names[int(k)] for k in rng.choice(len(names), count, replace=False))

@@ -118,6 +118,11 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
         _share(
             "outside the catalogue: gives a wrong name", [bool(one.named) for one in of["outside"]], "<= 0.05"
         ),
+        _share(
+            "single, no camera: named right, or said to be invisible",
+            [bool(one.hits) or one.invisible for one in of["single"] if not one.camera],
+            ">= 0.90",
+        ),
         _share("two at once: exact set", [one.exact for one in of["double"]], ">= 0.80"),
         _share("two at once: at least one right", [bool(one.hits) for one in of["double"]], ""),
         _share("three at once: exact set", [one.exact for one in of["triple"]], ""),
