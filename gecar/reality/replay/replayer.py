@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
+from scipy.spatial import KDTree
 
 from gecar.reality.recordings.camera_frame import axle_pose
 from gecar.reality.recordings.encoder_zero import LATEST_FIRST_ROW_S
@@ -29,6 +30,8 @@ DEG = np.pi / 180.0
 # What replays assume where a recording says nothing: whole degrees, 10 mV, 0.5 deg/s, 1 mm, 0.3 deg.
 USUAL_NOISE = (0.29 * DEG, 0.01, 0.5 * DEG, 0.001, 0.3 * DEG)
 USUAL_WALK = (3e-4, 0.1 * DEG)  # m/sqrt(s), rad/sqrt(s)
+PATCH = ("patch_radius", "patch_x", "patch_y", "patch_friction")
+X_Y = slice(4, 6)  # columns of predicted rows
 FEWEST_LANES = 4  # fewer robots are replayed faster one by one
 
 
@@ -155,12 +158,19 @@ class Replayer:
     def errors(self, physics: npt.NDArray[Any]) -> Array:
         """Return the normalised residuals of replays under n physics records, shape (n, 4 rows + 3 poses).
 
-        Those of encoders, battery and gyro, channel by channel, then those of the poses.
+        Those of encoders, battery and gyro, channel by channel, then those of the poses. Robots that differ by a
+        slippery patch only, which none of them enters, are replayed once: up to a patch it changes nothing.
         """
         physics = self._capped(physics)
         rows, poses = len(self.t), len(self.inputs.pose_t)
         out = np.empty((len(physics), 4 * rows + 3 * poses))
-        for some in _in_step(physics):
+        left = np.ones(len(physics), bool)
+        for bare, numbers in _alike_but_for_a_patch(physics):
+            found = self.play(bare)
+            missed = numbers[~_enters(found.rows, physics[numbers])]
+            out[missed] = np.r_[found.row_errors.T.ravel(), found.pose_errors.T.ravel()]
+            left[missed] = False
+        for some in _in_step(physics, np.flatnonzero(left)):
             robots = physics[np.resize(some, LANES if len(some) > 1 else 1)]
             kept = replay_rows(self.inputs, robots, self.start, self.clock_offset_s, STEP_S, False)
             for lane, number in enumerate(some):
@@ -232,20 +242,52 @@ def replayer_of(
     return Replayer(recording, inputs, pose, _first_pose(pose))
 
 
-def _in_step(physics: npt.NDArray[Any]) -> Iterator[list[int]]:
-    """Yield which records to replay together: up to `LANES` that share `TIMING`, plain ones apart.
+def _alike_but_for_a_patch(
+    physics: npt.NDArray[Any],
+) -> Iterator[tuple[npt.NDArray[Any], npt.NDArray[np.int_]]]:
+    """Yield records without a slippery patch, shape (1,), and the numbers of those that are one of them with a patch.
+
+    Few are left out, and so are those with terms.
+    """
+    patched = np.flatnonzero((physics["patch_radius"] > 0.0) & (physics["n_terms"] == 0.0))
+    if len(patched) < FEWEST_LANES:
+        return
+    bare = physics[patched]
+    for field in PATCH:
+        bare[field] = 0.0
+    groups: dict[bytes, list[int]] = {}
+    for k, record in enumerate(bare):
+        groups.setdefault(record.tobytes(), []).append(k)
+    for some in groups.values():
+        if len(some) >= FEWEST_LANES:
+            yield bare[some[:1]], patched[some]
+
+
+def _enters(rows: Array, physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return whether a path comes so close to each record's patch that it may enter between two rows, shape (n,)."""
+    path = rows[:, X_Y]
+    between = float(np.hypot(*np.diff(path, axis=0).T).max(initial=0.0))
+    centres = np.column_stack([physics["patch_x"], physics["patch_y"]])
+    nearest, _ = KDTree(path).query(centres)
+    return np.asarray(nearest < physics["patch_radius"] + between)
+
+
+def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_]) -> Iterator[list[int]]:
+    """Yield which of some records to replay together: up to `LANES` that share `TIMING`, plain ones apart.
 
     Few are replayed one by one, and so are those with terms.
     """
     alike: dict[Any, list[int]] = {}
-    for number, key in enumerate(zip(physics[list(TIMING)].tolist(), is_plain(physics), strict=True)):
+    chosen = physics[numbers]
+    keys = zip(chosen[list(TIMING)].tolist(), is_plain(chosen), strict=True)
+    for number, key in zip(numbers.tolist(), keys, strict=True):
         if physics["n_terms"][number] > 0.0:
             yield [number]
         else:
             alike.setdefault(key, []).append(number)
-    for numbers in alike.values():
-        for first in range(0, len(numbers), LANES):
-            some = numbers[first : first + LANES]
+    for shared in alike.values():
+        for first in range(0, len(shared), LANES):
+            some = shared[first : first + LANES]
             yield from [some] if len(some) >= FEWEST_LANES else [[number] for number in some]
 
 
