@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="MUJOCO IS MISSING: discovery is not examined (pip install gecar[test])")
 
+from benchmarks.concealed import cases
 from benchmarks.concealed.cases import draw_case
 from benchmarks.concealed.judging import judge
 from benchmarks.concealed.plan import read_label
@@ -33,5 +34,7 @@ def test_concealed_effect_is_named_alone_and_located(tmp_path):
     assert judged.gap_closed > 0.8
 
 
-def test_physics_outside_the_catalogue_is_given_no_name(tmp_path):
+def test_physics_outside_the_catalogue_is_given_no_name(tmp_path, monkeypatch):
+    # What nothing explains is explained three times: fewer recordings than the examination's save minutes.
+    monkeypatch.setattr(cases, "RUNS", ("holds", "holds", "sines", "line", "reversals"))
     assert examined("outside", ("off_centre_wheels",), 1, tmp_path).abstained
