@@ -258,7 +258,9 @@ def test_an_effect_taken_out_is_written_anew_in_a_3d_world_with_a_course():
     catalogue = [effect for effect in CATALOGUE if effect.id not in ("battery_resistance", "supply_voltage")]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        verdict = discover(read_case(PRACTICE), catalogue=catalogue, language=FEW)
+        case = read_case(PRACTICE)
+        some = replace(case, recordings=case.recordings[:5])  # in half the time of all
+        verdict = discover(some, catalogue=catalogue, language=FEW)
     (law,) = (law for law in verdict.invented if law.term.port == "supply_voltage")
     assert law.term.parsed.variables == ("draw",)
     assert law.parameters["c1"].value == pytest.approx(-1.2, rel=0.15)
