@@ -315,7 +315,8 @@ CATALOGUE: tuple[Effect, ...] = (
            ("pose",), "hard acceleration with slip", "quasi-static load transfer",
            needs=("floor",)),
     Effect("com_offset", "the centre of mass is further ahead or behind",
-           (_P("com_ahead", "ahead_m", "m", -0.084, 0.0, None, 0.004),),
+           # a castor wheel instead of a ball looked like 0.9 mm, and scales and a ruler say no more than 1 to 2 mm
+           (_P("com_ahead", "ahead_m", "m", -0.084, 0.0, None, 0.004, model_error_steps=0.5),),
            ("pose",), "turns", "rigid body on two wheels and a caster",
            needs=("floor",)),
     Effect("sensor_lag", "the colour sensor answers gradually",

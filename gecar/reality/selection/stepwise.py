@@ -18,6 +18,7 @@ from gecar.reality.selection.acceptance import (
     imitates_a_step,
     imitates_dry_friction,
     is_material,
+    is_worthwhile,
     proved,
     steady,
     stopped,
@@ -127,16 +128,22 @@ def concluded(
 ) -> Explanation:
     """Judge what effects leave, and which of them are material.
 
-    Where they leave much that is material, only those are kept that have one size in all recordings, and explain a good
+    Where they leave something material, those are no findings that are smaller than the catalogue's size: they may be
+    part of what is left. Where they leave much of it, others must have one size in all recordings, and explain a good
     part of what is left without them.
     """
     problem = problem.under(model)
     left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
     initial = problem.sizes.left(problem.known.physics, repeatedly=True)
     now, before = (problem.material.times(size) for size in (left, initial))
-    share, matters = now / max(before, 1.0), now > MEASURED
-    if matters and share > (1.0 - WHOLE_SHARE) ** 0.5:
-        kept = [step for step in steps if steady(problem, step) and _is_main(problem, model, step, now)]
+    if _is_much(model, now, before):
+        hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
+        kept = [
+            step
+            for step in steps
+            if (problem.on_bench or is_worthwhile(model, step.effect))
+            and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
+        ]
         if len(kept) < len(steps):
             rest = problem.under(problem.known, [s.effect for s in kept])
             fitted = rest.estimator.fit([s.effect for s in kept], model.values)
@@ -146,9 +153,15 @@ def concluded(
     if minor:  # what carries no claim bends no other effect's size
         problem = problem.under(model, [step.effect for step in named])
         model = problem.estimator.fit([step.effect for step in named], model.values)
-    return Explanation(
-        problem, model, named, tuple(tried), left, matters and share > left_share(model.effects), minor, whole
-    )
+        # What they explain is left, unless small changes of what is known explain it as well.
+        left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
+        now = problem.material.times(left)
+    return Explanation(problem, model, named, tuple(tried), left, _is_much(model, now, before), minor, whole)
+
+
+def _is_much(model: Model, now: float, before: float) -> bool:
+    """Whether a model leaves something material, which its laws are not to blame for; in times the line, before too."""
+    return now > MEASURED and now / max(before, 1.0) > left_share(model.effects)
 
 
 def left_share(effects: Sequence[str]) -> float:
