@@ -137,7 +137,7 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
         world=label.get("world", "mujoco"),
         setting=label.get("setting", {}),
         sizes=label.get("size", {}),
-        camera=not set(POSE).isdisjoint(label["conditions"]["columns"]),
+        camera=not set(POSE).isdisjoint(label.get("conditions", {}).get("columns", POSE)),
         invisible=_invisible(label["effects"], verdict.get("limits") or {}),
     )
 
