@@ -33,7 +33,7 @@ RESPONSES = {effect: bumps(seed, 4, 1.0) for seed, effect in enumerate(FOUR, sta
 SLOPES = np.stack(list(RESPONSES.values()), axis=1)
 INDEX = linear({}, RESPONSES).index
 BLOCKS = Blocks(INDEX)
-SIZES = np.full(len(FOUR), SMALL), np.full(len(FOUR), LARGE)
+SIZES = np.full(len(FOUR), SMALL), np.full(len(FOUR), LARGE), len(FOUR)
 
 
 def test_small_changes_are_noise_of_unit_variance_and_so_is_their_sum_with_noise() -> None:
@@ -152,7 +152,7 @@ def test_laws_may_leave_what_they_are_off_by() -> None:
 def test_small_changes_each_have_their_own_size() -> None:
     errors = np.random.default_rng(0).normal(size=len(SLOPES)) - SLOPES @ np.array([0.5, 0.5, 0.0, 0.0])
     small = np.array([0.3, 0.01, 0.3, 0.3])
-    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, small, SIZES[1])
+    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, small, *SIZES[1:])
     found = made.small_changes(errors, np.full(4, -1.0), np.full(4, 1.0))
     assert found[0] == pytest.approx(0.5, abs=0.1)
     assert found[1] < 0.3

@@ -50,6 +50,11 @@ class Discrepancy:
         Variance of each channel over its sensors' noise, shape (channels,).
     small
         Standard deviations of small changes, in the catalogue's sizes, shape (changes,).
+    uncertain
+        Which of the parameters' small changes residuals show, shape (parameters,); the changes after those are of
+        instruments and ripples.
+    unnamed
+        Singular vectors and values, as ``basis`` and ``spread``, of the changes of instruments and ripples alone.
     """
 
     scale: Array
@@ -59,13 +64,22 @@ class Discrepancy:
     back: Array
     ratios: Array
     small: Array
+    uncertain: npt.NDArray[np.bool_]
+    unnamed: tuple[Array, Array]
 
     def whitened(self, errors: Array) -> Array:
         """Return residuals of unit variance, shape (n,) or (m, n), from those in units of the sensors' noise."""
+        return self._whitened(errors, self.basis, self.spread)
+
+    def whitened_beside_parameters(self, errors: Array) -> Array:
+        """Return the same where the parameters' small changes are known, and those of instruments and ripples not."""
+        return self._whitened(errors, *self.unnamed)
+
+    def _whitened(self, errors: Array, basis: Array, spread: Array) -> Array:
         scaled = errors * self.scale
-        inside = (scaled * self.root_weight) @ self.basis
-        shrunk = inside * (1.0 - 1.0 / np.sqrt(1.0 + self.spread**2))
-        out: Array = scaled - (shrunk @ self.basis.T) / self.root_weight
+        inside = (scaled * self.root_weight) @ basis
+        shrunk = inside * (1.0 - 1.0 / np.sqrt(1.0 + spread**2))
+        out: Array = scaled - (shrunk @ basis.T) / self.root_weight
         return out
 
     def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
@@ -78,7 +92,13 @@ class Discrepancy:
 
 
 def discrepancy(
-    slopes: Array, errors: Array, blocks: Blocks, channel: npt.NDArray[np.int32], small: Array, large: Array
+    slopes: Array,
+    errors: Array,
+    blocks: Blocks,
+    channel: npt.NDArray[np.int32],
+    small: Array,
+    large: Array,
+    parameters: int,
 ) -> Discrepancy:
     """Return the discrepancy of a model.
 
@@ -94,6 +114,8 @@ def discrepancy(
         Of each, shape (n,).
     small, large
         Standard deviations of small changes, and of those whose remainder is physics in no list, shape (changes,).
+    parameters
+        How many of the changes, the first, are of parameters.
     """
     ratios, weight = np.ones(len(CHANNELS)), np.ones(len(errors))
     for _ in range(ROUNDS):
@@ -104,7 +126,10 @@ def discrepancy(
         weight = np.sqrt(weights(left))
         ratios = np.maximum(blocks.variances(np.clip(left, -CLIP, CLIP)) * ratios, 1.0)
     scale = 1.0 / np.sqrt(ratios[channel])
-    return Discrepancy(scale, weight, *_decomposed(slopes, scale, weight, small), ratios, small)
+    whole = _decomposed(slopes, scale, weight, small)
+    unnamed = _decomposed(slopes[:, parameters:], scale, weight, small[parameters:])[:2]
+    uncertain = np.any(slopes[:, :parameters], axis=0)
+    return Discrepancy(scale, weight, *whole, ratios, small, uncertain, unnamed)
 
 
 def _decomposed(slopes: Array, scale: Array, weight: Array, size: Array) -> tuple[Array, Array, Array]:

@@ -13,8 +13,9 @@ from gecar.reality.fitting.discrepancy import discrepancy
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import ripple_responses
 from gecar.reality.fitting.model import Model
-from gecar.reality.fitting.parameters import free
+from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import DEFAULT, Material
+from gecar.reality.optimisation.least_squares import cost_of_each, least_squares
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.parting import Sizes
@@ -25,6 +26,8 @@ from gecar.world.robot import Robot
 Array = npt.NDArray[np.float64]
 RIPPLE = "torque_ripple"
 LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
+PROBE = 0.4  # of a size worth a name: step of finite differences by small changes
+REFINEMENTS = 2  # of small changes, by derivatives taken anew
 COMMON_DELAY = "pose_delay"  # the effect that camera clocks late by the same time are
 
 
@@ -63,6 +66,9 @@ class Problem:
     clocks_fitted: bool = False
     refused: frozenset[str] = frozenset()
     worth: Mapping[str, float] = field(default_factory=dict)
+    _changes: dict[tuple[tuple[str, ...], bytes], Array] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def residuals(self) -> Residuals:
@@ -126,8 +132,9 @@ class Problem:
             sizes += [sized(p) for p in of_effect or [None] * columns.shape[1]]  # ripples, instruments: none
         errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
         small, large = np.array(sizes).reshape(-1, 2).T
+        parameters = sum(len(_small(effect)) for effect in self.catalogue)
         left = discrepancy(
-            np.concatenate(slopes, axis=1), errors, self.estimator.blocks, channel, small, large
+            np.concatenate(slopes, axis=1), errors, self.estimator.blocks, channel, small, large, parameters
         )
         estimator = self.estimator.under(left)
         return replace(self, estimator=estimator, known=estimator.known())
@@ -145,20 +152,59 @@ class Problem:
         """Return a model's values with the most likely small changes of all other parameters, by effect and label."""
         if self.estimator.discrepancy is None:
             return model.values
-        errors = self.residuals.errors((beside or model).physics)
-        slopes = self.estimator.discrepancy.back.shape[1]
+        parameters, z, at = self._with_others(model)
+        z[at] += self._most_likely(beside or model)
+        return parameters.values(np.clip(z, *parameters.bounds))
+
+    def _with_others(self, model: Model) -> tuple[Parameters, Array, npt.NDArray[np.intp]]:
+        """Return a model's parameters and those of all other effects, their vector, and where small changes stand."""
         others = [effect for effect in self.catalogue if effect not in model.effects]
         parameters = free(self.estimator.robot, (*model.effects, *others))
-        z, (lowest, highest) = parameters.vector(model.values), parameters.bounds
         place = {(c.effect.id, c.parameter.label): k for k, c in enumerate(parameters.coordinates)}
         at = [place[effect, p.label] for effect in self.catalogue for p in _small(effect)]
-        # Those of ripples and instruments come last, and stay out.
-        low, high = np.full(slopes, -1.0), np.full(slopes, 1.0)
+        return parameters, parameters.vector(model.values), np.array(at, np.intp)
+
+    def _most_likely(self, model: Model) -> Array:
+        """Return the most likely small changes beside a model, in the catalogue's sizes, shape (changes,).
+
+        Maximum a posteriori. Derivatives at the model give the start: what starts to slip a little sooner, or to play,
+        is not in proportion to its size.
+        """
+        key = (model.effects, model.z.tobytes())
+        if key in self._changes:
+            return self._changes[key]
+        left = self.estimator.discrepancy
+        assert left is not None
+        parameters, z, at = self._with_others(model)
+        low, high = self._room(parameters, z, at)
+        moving = np.flatnonzero(left.uncertain)
+        sd = left.small[moving]
+
+        def residual(changes: Array) -> Array:
+            vectors = np.tile(z, (len(np.atleast_2d(changes)), 1))
+            vectors[:, at[moving]] += changes
+            errors = self.residuals.errors_of_each(parameters.physics(np.clip(vectors, *parameters.bounds)))
+            out = np.hstack([left.whitened_beside_parameters(errors), np.atleast_2d(changes) / sd])
+            return out if changes.ndim == 2 else out[0]
+
+        bounds = low[moving], high[moving]
+        others = np.full(len(left.small) - len(at), 1.0)  # of instruments and ripples
+        linear = left.small_changes(
+            self.residuals.errors(model.physics), np.r_[low, -others], np.r_[high, others]
+        )
+        starts = np.array([np.zeros(len(moving)), linear[moving]])
+        start = starts[int(np.argmin(cost_of_each(residual, starts)))]
+        probes = PROBE * np.minimum(high, 1.0)[moving]
+        found = np.zeros(len(at))
+        found[moving] = least_squares(residual, start, bounds, probes, REFINEMENTS).z
+        self._changes[key] = found
+        return found
+
+    def _room(self, parameters: Parameters, z: Array, at: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the lowest and highest small changes, by the sizes worth a name and the parameters' bounds."""
+        lowest, highest = (bound[at] - z[at] for bound in parameters.bounds)
         room = np.array([self.share(parameters.coordinates[k].parameter) for k in at])
-        low[: len(at)] = np.clip(lowest[at] - z[at], -room, -LEAST_ROOM)
-        high[: len(at)] = np.clip(highest[at] - z[at], LEAST_ROOM, room)
-        z[at] += self.estimator.discrepancy.small_changes(errors, low, high)[: len(at)]
-        return parameters.values(np.clip(z, lowest, highest))
+        return np.clip(lowest, -room, -LEAST_ROOM), np.clip(highest, LEAST_ROOM, room)
 
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
         """Return the problem with camera clocks fitted under a model; None where that gains less than ``least_gain``.
