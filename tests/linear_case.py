@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -69,6 +70,9 @@ class LinearResiduals:
         return ResidualIndex(
             recording, np.zeros(len(self.noise), np.int32), np.tile(np.arange(rows) * ROW_S, self.count)
         )
+
+    def regimes(self, physics: np.ndarray) -> Mapping[str, np.ndarray]:
+        return defaultdict(lambda: np.zeros(len(self.noise), bool))  # no motion
 
     def errors(self, physics: np.ndarray) -> np.ndarray:
         return self.errors_of_each(physics)[0]

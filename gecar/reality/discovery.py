@@ -43,7 +43,7 @@ from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.acceptance import is_worthwhile, size_of, worsens
+from gecar.reality.selection.acceptance import is_worthwhile, size_of, steady, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
@@ -222,7 +222,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             fitted,
             motion.explained.problem.clocks_fitted,
             where.doubted,
-            [step.effect for stage in stages for step in stage.candidates],
+            [step for stage in stages for step in stage.candidates],
             valleys(motion.explained.problem, motion.explained.taken)
             if motion.explained.problem.on_bench
             else (),
@@ -303,11 +303,14 @@ def _explained_without(
     motion = _with_intervals(context, explained_and_confirmed(problem, beside))
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
     # What is left out may be off, but a cause does not take the robot farther from it; and what is smaller than the
-    # catalogue's size may be part of what is left.
+    # catalogue's size, or has not one size in all recordings, may be part of what is left.
     if (
         not motion.explained.steps
         or motion.explained.unexplained
-        or not all(is_worthwhile(taken, step.effect) for step in motion.explained.steps)
+        or not all(
+            is_worthwhile(taken, step.effect) and steady(motion.explained.problem, step)
+            for step in motion.explained.steps
+        )
         or worsens(problem, problem.known, taken, whole)
     ):
         return None

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gecar.reality.fitting.model import Step
 from gecar.reality.recordings.split import Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
 
+NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
+DRIFTS = "its size differs between recordings, times or kinds of motion: it imitates something else"
 LEFT_OUT = {
     "encoders": "The encoders have an error of their own, which no effect of the catalogue explains. They were left "
     "out: what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles.",
@@ -24,7 +27,7 @@ def notes_on(
     fitted: Residuals,
     clocks_fitted: bool,
     doubted: bool,
-    candidates: Sequence[str] = (),
+    candidates: Sequence[Step] = (),
     alike: Sequence[Sequence[str]] = (),
     left_out: str = "",
     unseen: Sequence[str] = (),
@@ -43,7 +46,8 @@ def notes_on(
     doubted
         Whether a misfit of readings points to the measured path, rather than to the sensor.
     candidates
-        Effects accepted on the recordings fitted on, and not confirmed by those set aside.
+        Effects accepted on the recordings fitted on, and no findings: their size differs between recordings, times or
+        regimes, or the recordings set aside do not confirm them.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
     left_out
@@ -54,9 +58,9 @@ def notes_on(
         The same recordings with the faults of their logs.
     """
     notes = [
-        f"{effect} explains the fitted recordings, but the held-out ones do not confirm it, or its interval "
-        "contains its neutral value: a candidate, not a finding."
-        for effect in candidates
+        f"{step.effect} explains the fitted recordings, but {DRIFTS if step.drifts else NOT_CONFIRMED}: a candidate, "
+        "not a finding."
+        for step in candidates
     ]
     notes += [
         f"The held-out recordings do not show {effect}. It was found on the others"

@@ -87,6 +87,8 @@ class Step:
         At which stage of a chain it was tried, from 0.
     holdout_gain
         What it lowers the cost of the recordings set aside by, against the others refitted without it.
+    drifts
+        Whether its size differs between recordings, times or regimes.
     """
 
     effect: str
@@ -101,3 +103,4 @@ class Step:
     energy_after: float = 0.0
     stage: int = 0
     holdout_gain: float = np.nan
+    drifts: bool = False

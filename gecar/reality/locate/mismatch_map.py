@@ -10,10 +10,10 @@ import numpy.typing as npt
 from scipy.stats import norm
 
 from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
-from gecar.reality.locate.regimes import regime_masks
 from gecar.reality.locate.shift_test import DRAWS, best_disc, regime_p
 from gecar.reality.replay.channels import CHANNELS, REFLECTION, ResidualIndex
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.residuals.regimes import regime_masks
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.verdict import Place
 

@@ -80,7 +80,7 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
     held
         Residuals of the same kind, of the recordings set aside.
     """
-    candidates, unseen = list[Step](), set[str]()
+    candidates, unseen = list(explained.drifting), set[str]()
     while explained.steps and held.recordings:
         with_all = _held_errors(explained, held, explained.taken, explained.taken)
         without = {s.effect: _without(explained.problem, explained.taken, s) for s in explained.steps}
@@ -217,7 +217,7 @@ def dropped(explained: Explanation, step: Step) -> Explanation:
     """Return an explanation without an effect, the others refitted; the robot's own value of it comes back."""
     steps = [s for s in (*explained.steps, *explained.minor) if s.effect != step.effect]
     model = _without(explained.problem, explained.whole, step)
-    return concluded(explained.problem, model, steps, explained.tried)
+    return concluded(explained.problem, model, steps, explained.tried, explained.drifting)
 
 
 def _without(problem: Problem, model: Model, step: Step) -> Model:

@@ -20,6 +20,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.replay.odometry import smoothed_rows
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
+from gecar.reality.residuals.regimes import motions
 from gecar.reality.residuals.threads import Threads
 from gecar.world.course.course import Course, load_course
 
@@ -109,6 +110,17 @@ class Residuals:
     def index(self) -> ResidualIndex:
         """Where each residual comes from."""
         return self._located[0]
+
+    def regimes(self, physics: Physics) -> dict[str, Mask]:
+        """Return in which regimes of a robot's motion each residual lies, by name, each of shape (n,)."""
+        index, out = self.index, dict[str, Mask]()
+        for number, run in enumerate(self.recordings):
+            own = index.recording == number
+            t = run.replayer.t - run.replayer.t[0]
+            row = np.minimum(np.searchsorted(t, index.t_s[own]), len(t) - 1)
+            for name, mask in motions(run, physics).items():
+                out.setdefault(name, np.zeros(len(own), bool))[own] = mask[row]
+        return out
 
     @property
     def reading_sd(self) -> Array:

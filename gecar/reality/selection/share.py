@@ -16,6 +16,7 @@ Geyer, Statistical Science 7 (1992) 473 (autocovariances summed while they are p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -81,19 +82,37 @@ def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) ->
 def spread_of_size(folds: npt.NDArray[np.int32], without: Array, with_effect: Array) -> float:
     """Return the standard deviation, over folds, of the share of an effect that each asks for; each by its weight.
 
-    A cause has one size. What imitates another has the size, in each recording, that imitates best there (heterogeneity
-    of effect sizes: Cochran, Biometrics 10 (1954) 101; here without its test, for no cause is free of the simulation's
-    own faults).
+    A cause has one size. What imitates another has the size, in each recording, that imitates best there.
     """
-    change, w = without - with_effect, weights(with_effect)
-    information = np.bincount(folds, w * change * change)
-    asked = np.bincount(folds, w * without * change)
-    known = information > 0.0
-    shares, information = asked[known] / information[known], information[known]
+    shares, information = shares_of_groups(folds, without, with_effect)
     if not len(shares):
         return float("inf")
     mean = np.average(shares, weights=information)
     return float(np.sqrt(np.average((shares - mean) ** 2, weights=information)))
+
+
+def shares_of_groups(
+    groups: npt.NDArray[np.integer[Any]], without: Array, with_effect: Array
+) -> tuple[Array, Array]:
+    """Return the share of an effect that each group of residuals asks for, and the information on it.
+
+    Parameters
+    ----------
+    groups
+        Of each residual, shape (n,).
+    without, with_effect
+        Whitened residuals of the two models, shape (n,).
+
+    Returns
+    -------
+    tuple
+        Shares, and one over their variances, shape (groups,); groups in which the effect does not show are left out.
+    """
+    change, w = without - with_effect, weights(with_effect)
+    information = np.bincount(groups, w * change * change).astype(float)
+    asked = np.bincount(groups, w * without * change)
+    known = information > 0.0
+    return asked[known] / information[known], information[known]
 
 
 def sums_of_spans(index: ResidualIndex, values: Array) -> dict[int, Array]:

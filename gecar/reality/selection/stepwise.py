@@ -20,10 +20,12 @@ from gecar.reality.selection.acceptance import (
     is_material,
     is_worthwhile,
     proved,
+    size_of,
     steady,
     stopped,
 )
 from gecar.reality.selection.cross_validation import judged
+from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.motor_constants import CONSTANTS, with_constants
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
@@ -67,6 +69,8 @@ class Explanation:
         Effects that are too small for a name, and the model with them.
     spot
         Where on the floor something is left, if at one place only: x, y [m].
+    drifting
+        Effects that were taken and are no findings, as their sizes differ between recordings, times or regimes.
     """
 
     problem: Problem
@@ -78,6 +82,7 @@ class Explanation:
     minor: tuple[Step, ...]
     whole: Model
     spot: tuple[float, float] | None = None
+    drifting: tuple[Step, ...] = ()
 
 
 def explain(problem: Problem) -> Explanation:
@@ -124,16 +129,27 @@ def _steps(problem: Problem, model: Model) -> tuple[Step, ...]:
 
 
 def concluded(
-    problem: Problem, model: Model, steps: Sequence[Step], tried: Sequence[tuple[Step, ...]]
+    problem: Problem,
+    model: Model,
+    steps: Sequence[Step],
+    tried: Sequence[tuple[Step, ...]],
+    drifting: tuple[Step, ...] = (),
 ) -> Explanation:
     """Judge what effects leave, and which of them are material.
 
-    Where they leave something material, those are no findings that are smaller than the catalogue's size: they may be
-    part of what is left. Where they leave much of it, others must have one size in all recordings, and explain a good
-    part of what is left without them.
+    Those are no findings whose size differs between recordings, times or regimes. Where they leave something material,
+    those are none that are smaller than the catalogue's size: they may be part of what is left. Where they leave much
+    of it, others must have one size in all recordings to a few percent, and explain a good part of what is left without
+    them. Those known to differ (``drifting``) do not: where one is material, so is what it imitates.
     """
     problem = problem.under(model)
-    left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
+    weakest = _weakest_drifting(problem, model, steps)
+    if weakest is not None:
+        kept = [step for step in steps if step is not weakest]
+        fitted = _fitted_anew(problem, model, kept)
+        beside = [_beside_others(problem, fitted, step) for step in kept]
+        return concluded(problem, fitted, beside, tried, (*drifting, replace(weakest, drifts=True)))
+    left = _left(problem, model)
     initial = problem.sizes.left(problem.known.physics, repeatedly=True)
     now, before = (problem.material.times(size) for size in (left, initial))
     if _is_much(model, now, before):
@@ -145,18 +161,49 @@ def concluded(
             and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
         ]
         if len(kept) < len(steps):
-            rest = problem.under(problem.known, [s.effect for s in kept])
-            fitted = rest.estimator.fit([s.effect for s in kept], model.values)
-            return concluded(problem, fitted, kept, tried)
+            return concluded(problem, _fitted_anew(problem, model, kept), kept, tried, drifting)
     minor = tuple(step for step in steps if not is_material(problem, model, step))
     named, whole = tuple(step for step in steps if step not in minor), model
     if minor:  # what carries no claim bends no other effect's size
         problem = problem.under(model, [step.effect for step in named])
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
-        left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
+        left = _left(problem, model)
         now = problem.material.times(left)
-    return Explanation(problem, model, named, tuple(tried), left, _is_much(model, now, before), minor, whole)
+    much = _is_much(model, now, before) or any(
+        problem.material.times(size_of(problem, step.model, step)) > MEASURED for step in drifting
+    )
+    return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
+
+
+def _left(problem: Problem, model: Model) -> Size:
+    """Return what a model leaves, with the most likely small changes of all constants or, if that is less, without.
+
+    They explain windows of a second, and may take whole drives farther from what was measured.
+    """
+    robots = (model.physics, problem.with_small_changes(model))
+    return min(
+        (problem.sizes.left(physics, repeatedly=True) for physics in robots), key=problem.material.times
+    )
+
+
+def _weakest_drifting(problem: Problem, model: Model, steps: Sequence[Step]) -> Step | None:
+    """Return the effect that gains least of those whose size differs; a bench's recordings are of one regime each."""
+    drifting = [] if problem.on_bench else [step for step in steps if drifts(problem, model, step)]
+    return min(drifting, key=lambda step: step.gain, default=None)
+
+
+def _fitted_anew(problem: Problem, model: Model, kept: Sequence[Step]) -> Model:
+    effects = [step.effect for step in kept]
+    return problem.under(problem.known, effects).estimator.fit(effects, model.values)
+
+
+def _beside_others(problem: Problem, model: Model, step: Step) -> Step:
+    """Return a step on top of a model's other effects, with what is known of how it was taken."""
+    rest = [effect for effect in model.effects if effect != step.effect]
+    estimator = problem.under(model, rest).estimator
+    base, whole = estimator.fit(rest, model.values), estimator.fit(model.effects, model.values)
+    return replace(step, base=base, model=whole, gain=base.cost - whole.cost)
 
 
 def _is_much(model: Model, now: float, before: float) -> bool:
@@ -175,8 +222,7 @@ def _is_main(problem: Problem, model: Model, step: Step, times: float) -> bool:
     rest = [effect for effect in model.effects if effect != step.effect]
     here = problem.under(model, rest)
     fitted = here.estimator.fit(rest, model.values)
-    without = here.sizes.left(here.with_small_changes(fitted), repeatedly=True)
-    return times**2 < (1.0 - MAIN_SHARE) * problem.material.times(without) ** 2
+    return times**2 < (1.0 - MAIN_SHARE) * problem.material.times(_left(here, fitted)) ** 2
 
 
 @dataclass(frozen=True)

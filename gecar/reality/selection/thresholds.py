@@ -71,8 +71,8 @@ MAIN_SHARE = Threshold(
 )
 STEADY = Threshold(
     0.08,
-    "relative spread over recordings of an effect's size, where other error remains unexplained",
-    "10 cases of the 3D engine with other physics: causes 0.00 to 0.06, imitations of that physics 0.10 to 0.27",
+    "relative spread of an effect's size over recordings, times or regimes from which on it drifts",
+    "10 cases of the 3D engine: causes 0.00 to 0.06, imitations 0.10 to 0.27; 19 of the continuous world: the same",
 )
 UNSTEADY = Threshold(
     0.3,

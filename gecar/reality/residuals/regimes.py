@@ -30,6 +30,12 @@ def regime_masks(
     return masks, np.stack([table[1] for table in tables])
 
 
+def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mask]:
+    """Return the regimes that the motion and the commands themselves tell, by name, each of shape (rows,)."""
+    lasting = max(int(AFTER_S / float(np.median(np.diff(run.replayer.t)))), 1)
+    return _motions(run.replayer.play(physics)[0], run.recording.commands, lasting)
+
+
 def _table(
     run: RecordingResiduals, physics: npt.NDArray[Any], bins: int, bin_s: float
 ) -> tuple[dict[str, Mask], Array]:

@@ -1,0 +1,110 @@
+"""Whether an effect has one size in all recordings, at all times and in all regimes: a cause has, an imitation drifts.
+
+Each group of residuals asks for a share of the effect as it was fitted: 1 where it is right (`share`). The shares'
+spread is tested by Cochran's Q, as effect sizes of several studies are, and measured by what exceeds sampling noise.
+
+Sources: Cochran, Biometrics 10 (1954) 101 (Q); DerSimonian and Laird, Controlled Clinical Trials 7 (1986) 177 (the
+variance that exceeds sampling noise).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2
+
+from gecar.reality.fitting.model import Model, Step
+from gecar.reality.fitting.parameters import free
+from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.share import shares_of_groups
+from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE, STEADY
+
+Array = npt.NDArray[np.float64]
+Groups = npt.NDArray[np.intp]
+
+THIRDS = 3
+REGIMES = (("slow", "fast"), ("straight", "turning"), ("backward",), ("change of command",))
+"""Each splits the residuals into those of its regimes, and the others."""
+
+
+class Heterogeneity(NamedTuple):
+    """How an effect's size differs between groups.
+
+    Attributes
+    ----------
+    relative
+        Standard deviation of the size between groups beyond sampling noise, as a share of the size.
+    p
+        p-value of Cochran's Q.
+    """
+
+    relative: float
+    p: float
+
+
+def drifts(problem: Problem, model: Model, step: Step) -> bool:
+    """Whether the size of one of a model's effects differs between recordings, times or regimes: surely, and by much.
+
+    It must differ where small changes of all constants are unknown, as noise; and not by a negligible part beside the
+    most likely ones, for as noise they may hide all of an effect but an odd little.
+    """
+    known = _beside_small_changes(problem, model, step.effect)
+    splits = list(_splits(problem, model))
+    chance = SIGNIFICANCE / len(splits)  # Bonferroni
+    return any(
+        _differs(heterogeneity(groups, step.base.errors, step.model.errors), STEADY, chance)
+        and _differs(heterogeneity(groups, *known), NEGLIGIBLE, chance)
+        for groups in splits
+    )
+
+
+def _differs(found: Heterogeneity, least: float, chance: float) -> bool:
+    return found.relative > least and found.p < chance
+
+
+def _beside_small_changes(problem: Problem, model: Model, effect: str) -> tuple[Array, Array]:
+    """Return the residuals without an effect of a model and with it, beside the model's most likely small changes."""
+    left = problem.estimator.discrepancy
+    values = problem.small_changes(model)
+    rest = {each: of for each, of in values.items() if each != effect}
+    parameters = free(problem.estimator.robot, tuple(rest))
+    physics = np.concatenate([parameters.physics(parameters.vector(rest)), problem.with_small_changes(model)])
+    errors = problem.residuals.errors_of_each(physics)
+    without, with_effect = errors if left is None else left.whitened_beside_parameters(errors)
+    return without, with_effect
+
+
+def heterogeneity(groups: Groups, without: Array, with_effect: Array) -> Heterogeneity:
+    """Return how the share of an effect that residuals ask for differs between groups.
+
+    Groups that hardly show the effect say nothing of its size.
+
+    Parameters
+    ----------
+    groups
+        Of each residual, shape (n,).
+    without, with_effect
+        Whitened residuals of the two models, shape (n,).
+    """
+    shares, information = shares_of_groups(groups, without, with_effect)
+    shown = information > NEGLIGIBLE * information.sum()
+    shares, information = shares[shown], information[shown]
+    if len(shares) < 2:
+        return Heterogeneity(0.0, 1.0)
+    mean = np.average(shares, weights=information)
+    q, freedom = float(information @ (shares - mean) ** 2), len(shares) - 1
+    of_all = float(information.sum() - information @ information / information.sum())
+    return Heterogeneity(float(np.sqrt(max(q - freedom, 0.0) / of_all)), float(chi2.sf(q, freedom)))
+
+
+def _splits(problem: Problem, model: Model) -> Iterator[Groups]:
+    """Yield groups of the residuals: by recording, by thirds of the time, and by regimes of the motion."""
+    index = problem.residuals.index
+    yield index.recording.astype(np.intp)
+    yield np.minimum(THIRDS * index.t_s / max(float(index.t_s.max()), 1e-9), THIRDS - 1).astype(np.intp)
+    masks = problem.residuals.regimes(model.physics)
+    for names in REGIMES:
+        yield np.select([masks[name] for name in names], range(1, len(names) + 1)).astype(np.intp)
