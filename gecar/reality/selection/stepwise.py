@@ -20,7 +20,6 @@ from gecar.reality.selection.acceptance import (
     is_material,
     is_worthwhile,
     proved,
-    size_of,
     steady,
     stopped,
 )
@@ -140,7 +139,7 @@ def concluded(
     Those are no findings whose size differs between recordings, times or regimes. Where they leave something material,
     those are none that are smaller than the catalogue's size: they may be part of what is left. Where they leave much
     of it, others must have one size in all recordings to a few percent, and explain a good part of what is left without
-    them. Those known to differ (``drifting``) do not: where one is material, so is what it imitates.
+    them. ``drifting`` are those known to differ.
     """
     problem = problem.under(model)
     weakest = _weakest_drifting(problem, model, steps)
@@ -170,9 +169,7 @@ def concluded(
         # What they explain is left, unless small changes of what is known explain it as well.
         left = _left(problem, model)
         now = problem.material.times(left)
-    much = _is_much(model, now, before) or any(
-        problem.material.times(size_of(problem, step.model, step)) > MEASURED for step in drifting
-    )
+    much = _is_much(model, now, before)
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
