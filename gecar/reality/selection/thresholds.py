@@ -72,7 +72,7 @@ MAIN_SHARE = Threshold(
 STEADY = Threshold(
     0.08,
     "relative spread of an effect's size over recordings, times or regimes from which on it drifts",
-    "10 cases of the 3D engine: causes 0.00 to 0.06, imitations 0.10 to 0.27; 19 of the continuous world: the same",
+    "10 cases of the 3D engine: causes 0.00 to 0.06, imitations 0.10 to 0.27; 19 of the continuous world: 0.10 to 2",
 )
 UNSTEADY = Threshold(
     0.3,
