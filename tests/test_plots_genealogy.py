@@ -10,6 +10,8 @@ from searching import MAPPER, SMALL, generations, new_evolution
 
 from gecar.errors import InputError
 from gecar.evolution.lineage import Lineage
+from gecar.plots.drives.animation import BETWEEN_S, LAST_FRAME_S
+from gecar.plots.runs.evolution_film import LONGEST_S, MOST_SHOWN, PACE, choose_shown, pace_of
 from gecar.plots.runs.genealogy import fitness_words, genealogy, steps_of
 from gecar.plots.style import is_whole
 from gecar.results.ancestry import read_ancestry
@@ -124,7 +126,7 @@ def test_plot_draws_only_what_is_named(gecar, finished, tmp_path):
     assert ended["films"] == [str(tmp_path / "e.gif")]
     assert set(finished.iterdir()) == before
     with Image.open(tmp_path / "e.gif") as film:
-        assert film.n_frames > len(read_ancestry(finished).lineage.champions())
+        assert film.n_frames > min(len(read_ancestry(finished).lineage.champions()), MOST_SHOWN)
 
 
 @pytest.mark.parametrize(
@@ -138,3 +140,15 @@ def test_plot_draws_only_what_is_named(gecar, finished, tmp_path):
 )
 def test_what_can_not_be_drawn_is_one_line(gecar, words, named):
     assert named in gecar.error("plot", *words)
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 65])
+def test_a_film_of_an_evolution_begins_with_the_failures_and_lasts_half_a_minute(count):
+    shown = choose_shown(range(count))
+    assert len(shown) == len(set(shown)) == min(count, MOST_SHOWN)
+    assert shown == sorted(shown)
+    assert (shown[0], shown[-1]) == (0, count - 1)
+    times_s = [60.0] * len(shown)
+    held_s = BETWEEN_S * (len(shown) - 1) + LAST_FRAME_S
+    assert sum(times_s) / pace_of(times_s) + held_s <= LONGEST_S < 30.0
+    assert pace_of([17.0]) == PACE

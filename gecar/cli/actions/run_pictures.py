@@ -20,7 +20,7 @@ from gecar.plots.drives.trajectory import trajectory
 from gecar.plots.runs.compare_runs import compare_runs
 from gecar.plots.runs.convergence import Reference, convergence
 from gecar.plots.runs.derivation_tree import tree_of
-from gecar.plots.runs.evolution_film import Champion, film_evolution
+from gecar.plots.runs.evolution_film import Champion, choose_shown, film_evolution
 from gecar.plots.runs.front import archive_figure, front_figure
 from gecar.plots.runs.genealogy import genealogy
 from gecar.plots.runs.population import population_figure
@@ -201,7 +201,7 @@ def _shares_in(task: Task, ancestry: Ancestry) -> Callable[[Member], float | Non
 
 
 def film_run(folder: Path, target: Path) -> Path:
-    """Film the best program of each generation of a run that brought a better one.
+    """Film programs that were the best of a run so far, the first and the last among them, in half a minute at most.
 
     Raises
     ------
@@ -217,9 +217,9 @@ def film_run(folder: Path, target: Path) -> Path:
 
 
 def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
-    """Drive the best program of each generation that brought a better one, as the run scored it."""
+    """Drive the programs that a film shows, each the best so far, as the run scored it."""
     members = [(member[0], ancestry.program(member)) for member in ancestry.lineage.champions()]
-    found = [(generation, program) for generation, program in members if program is not None]
+    found = choose_shown([(generation, program) for generation, program in members if program is not None])
     arriving = shares(world, [program for _, program in found], settings["seed"])
     champions = []
     for (generation, program), share in zip(found, arriving, strict=True):

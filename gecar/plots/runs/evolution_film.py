@@ -1,4 +1,4 @@
-"""An evolution as a film: the best program of each generation that brought a better one drives round the course."""
+"""An evolution as a film: programs that were the best so far drive round the course, one after the other."""
 
 from __future__ import annotations
 
@@ -6,21 +6,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
 from gecar.language.program import Program
-from gecar.plots.drives.animation import Scene, film_of
+from gecar.plots.drives.animation import BETWEEN_S, LAST_FRAME_S, Scene, film_of
 from gecar.plots.runs.convergence import UNSOLVED
 from gecar.plots.style import BLUE, FAINT
 from gecar.world.rollout import Drive, World
 
-PACE = 12.0
-"""Seconds of driving in a second of film."""
+PACE, FASTEST = 12.0, 100.0
+"""Seconds of driving in a second of film: usually, and at most."""
+MOST_SHOWN = 8
+"""Drives in a film."""
+LONGEST_S = 29.0
+"""Length of a film [s]."""
 
 Series = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ def film_evolution(
     world
         Where they drive.
     champions
-        In the order they came.
+        In the order they came, for example those that `choose_shown` returns.
     history
         Columns of ``history.csv``, each (generations,): generation, best [s].
     path
@@ -65,7 +71,19 @@ def film_evolution(
         If the ending is another, or an MP4 is wanted where there is no ffmpeg.
     """
     scenes = [partial(EvolutionScene, world, champion, history) for champion in champions]
-    return film_of(scenes, path, pace=PACE)
+    return film_of(scenes, path, pace=pace_of([champion.drive.time_s for champion in champions]))
+
+
+def choose_shown(champions: Sequence[T]) -> list[T]:
+    """Return the first, the last, and others evenly between, in order, at most `MOST_SHOWN`."""
+    count = min(len(champions), MOST_SHOWN)
+    return [champions[k] for k in np.linspace(0, len(champions) - 1, count).round().astype(int)]
+
+
+def pace_of(times_s: Sequence[float]) -> float:
+    """Return the pace at which drives of these times [s] make a film of at most `LONGEST_S`."""
+    held_s = BETWEEN_S * (len(times_s) - 1) + LAST_FRAME_S
+    return min(max(PACE, sum(times_s) / (LONGEST_S - held_s)), FASTEST)
 
 
 class EvolutionScene(Scene):
