@@ -1,4 +1,4 @@
-"""A run's convergence: the best time to GOAL, the population's mean fitness, and how varied it is."""
+"""A run's convergence: the best time to GOAL, and how much of the population is at GOAL, valid and distinct."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from gecar.plots.style import (
     ORANGE,
     PAPER,
     PURPLE,
+    SKY,
     SOFT,
     VERMILION,
     headline,
@@ -53,7 +54,7 @@ def convergence(
     Parameters
     ----------
     history
-        Columns of ``history.csv``, each (generations,): generation, best, mean [s], valid, distinct [shares]; if there,
+        Columns of ``history.csv``, each (generations,): generation, best [s], valid, distinct [shares]; if there,
         also solved [share] and mean_solved [s].
     references
         Times to draw across the picture.
@@ -64,9 +65,9 @@ def convergence(
     """
     generation, best = history["generation"], np.minimum.accumulate(history["best"])
     with look():
-        figure = new_figure(8.0, 6.6)
+        figure = new_figure(8.0, 5.6)
         headline(figure, title, detail)
-        top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.2, 1.2))
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.2))
         draw_best(top, generation, best, references, winner)
         _draw_begun_anew(top, history, best)
         if "mean_solved" in history:
@@ -75,7 +76,6 @@ def convergence(
             )
         if (best < UNSOLVED).any():
             top.legend(loc="upper right")
-        _draw_mean(middle, generation, history["mean"])
         _draw_shares(bottom, history)
         bottom.set_xlabel("generation")
         bottom.xaxis.set_major_locator(MaxNLocator(integer=True, steps=(1, 2, 5, 10)))
@@ -177,7 +177,7 @@ def draw_references(
     clear_of_s
         A time that is drawn at that end [s]: words stand above lines, but below those that are below it.
     """
-    for colour, reference in zip((VERMILION, INK, PURPLE), references, strict=False):
+    for colour, reference in zip((VERMILION, INK, SOFT), references, strict=False):
         below = reference.time_s <= clear_of_s
         axes.axhline(reference.time_s, color=colour, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
         axes.annotate(
@@ -202,27 +202,13 @@ def _frame(axes: Axes, times: Sequence[float], references: Sequence[Reference]) 
     axes.set_ylim(max(low - 0.13 * room, 0.0), high + 0.16 * room)
 
 
-def _draw_mean(axes: Axes, generation: Series, mean: Series) -> None:
-    axes.plot(generation, mean, color=ORANGE, marker=_marker(generation))
-    axes.set(
-        yscale="log",
-        ylabel="mean fitness\n(eq. 1) [s]",
-        ylim=(min(10.0, float(np.nanmin(mean))), 1.6 * UNSOLVED),
-    )
-    axes.axhline(UNSOLVED, color=SOFT, linewidth=0.8, linestyle=":")
-    axes.annotate(  # above the panel: below the dotted line the mean runs through it
-        "no program at GOAL: $10^4$", (1.0, 1.0), (-2, 2), xycoords="axes fraction",
-        textcoords="offset points", ha="right", va="bottom", size=7, color=SOFT,
-    )  # fmt: skip
-
-
 def _draw_shares(axes: Axes, history: Mapping[str, Series]) -> None:
     generation = history["generation"]
     marker = _marker(generation)
     axes.plot(generation, 100 * history["valid"], color=GREEN, marker=marker, label="valid")
     axes.plot(generation, 100 * history["distinct"], color=PURPLE, marker=marker, label="distinct programs")
     if "solved" in history:
-        axes.plot(generation, 100 * history["solved"], color=BLUE, marker=marker, label="at GOAL")
+        axes.plot(generation, 100 * history["solved"], color=SKY, marker=marker, label="at GOAL")
     axes.set(ylabel="population [%]", ylim=(-4, 108))
     axes.legend(ncols=3, loc="upper right", bbox_to_anchor=(1.0, 1.2), borderaxespad=0.0)
 
