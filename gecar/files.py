@@ -105,7 +105,7 @@ def read_text(path: Path, what: str) -> str:
         If it is missing, a folder, unreadable or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # an editor on Windows may begin a file with a mark
     except UnicodeDecodeError as error:
         raise expected(path, f"bytes that are not UTF-8 at {error.start}", f"{what} as UTF-8 text") from None
     except FileNotFoundError:

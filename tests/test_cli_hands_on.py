@@ -1,8 +1,13 @@
 """Small things that people run into first: misspelt names, where files go, a robot of one's own, completion."""
 
+import io
+import re
+
 import numpy as np
 import pytest
+from rich.console import Console
 
+from gecar.cli.progress import Steps
 from gecar.errors import InputError
 from gecar.reality.recordings.recording import Case, make_recording
 from gecar.reality.recordings.setup import Setup
@@ -18,11 +23,28 @@ PROGRAM = "motor(70,70,100)\n"
         (("course", "show", "hairpn"), "did you mean 'hairpin'?"),
         (("robot", "show", "papr"), "did you mean 'paper'?"),
         (("grammar", "check", "nestd"), "did you mean 'nested'?"),
+        (("effects", "show", "backlsh"), "did you mean 'backlash'?"),
+        (("discover", "monday", "--about", "backlsh"), "did you mean 'backlash'?"),
     ],
 )
 def test_a_misspelt_name_is_asked_about(gecar, words, asked):
     assert asked in gecar.error(*words)
     assert "did you mean" not in gecar.error(*words[:-1], "qqqqq")
+
+
+def test_a_folder_above_the_one_meant_says_where_to_look(gecar, tmp_path):
+    (tmp_path / "week/monday").mkdir(parents=True)
+    (tmp_path / "week/monday/run.csv").touch()
+    assert "week: found no .csv file, but some in monday/, expected" in gecar.error("discover", "week")
+    assert "week: found a folder without config.toml, expected the folder of a run" in gecar.error(
+        "plot", "week"
+    )
+
+
+def test_a_mark_at_the_beginning_of_a_file_from_windows_is_no_text(gecar, tmp_path):
+    gecar("robot", "new", "mine.toml")
+    (tmp_path / "marked.toml").write_text((tmp_path / "mine.toml").read_text(), encoding="utf-8-sig")
+    assert load_robot(tmp_path / "marked.toml").motor == load_robot("ev3").motor
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# nothing\n"])
@@ -65,3 +87,15 @@ def test_recordings_are_set_aside_by_the_beginnings_of_their_names():
 
 def test_shells_can_complete_commands(gecar):
     assert "--install-completion" in gecar("--help").out
+
+
+def test_the_steps_of_a_long_command_take_one_line_of_a_terminal_and_a_line_each_of_a_file():
+    lines, screen = [], io.StringIO()
+    for terminal in (False, True):
+        with Steps(
+            lines.append, Console(file=screen, force_terminal=terminal, width=80, color_system=None)
+        ) as tell:
+            tell("backlash: gains 12")
+            tell("intervals")
+    assert lines == ["backlash: gains 12", "intervals"]
+    assert re.search(r"0:0\d:\d\d intervals", screen.getvalue())

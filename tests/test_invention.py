@@ -357,7 +357,7 @@ def test_what_a_law_looks_like(table, words):
 
 @pytest.mark.parametrize(
     ("option", "words"),
-    [("--without=gravity", "an effect of the catalogue"), ("--physics=none.bnf", "none.bnf")],
+    [("--without=gravity", "expected one of coulomb_friction"), ("--physics=none.bnf", "none.bnf")],
 )
 def test_the_command_line_names_what_it_does_not_know(gecar, tmp_path, option, words):
     (tmp_path / "case").mkdir()

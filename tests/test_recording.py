@@ -84,6 +84,7 @@ def test_unknown_column_is_passed_over_with_a_warning(write):
         ("", "found an empty file, expected a line of column names"),
         ("t_s,left_duty_pct,right_duty_pct\n0,0,0\n", "found 1 rows, expected at least two"),
         (FLOOR.replace("t_s", "seconds"), "expected a recording's columns .*first gecar import"),
+        (FLOOR.replace(",", ";"), "with semicolons between columns, expected .*first gecar import"),
         (FLOOR.replace("angle", "angel"), "column 4: found 'left_angel_deg', expected 'left_angle_deg'"),
         (FLOOR.replace("x_m", "left_angle_deg"), "column 5: found 'left_angle_deg' a second time"),
         (FLOOR.replace("0.02,", "0.005,"), "column t_s: found 0.005 after 0.01, expected an increasing time"),

@@ -52,6 +52,10 @@ def read_run_config(folder: Path) -> Config:
         If there is none, or it is wrong.
     """
     place = folder / "config.toml"
+    if folder.is_dir() and not place.is_file():
+        raise expected(
+            folder, "a folder without config.toml", "the folder of a run, as gecar evolve makes it"
+        )
     return configure(read_config(place), place)
 
 

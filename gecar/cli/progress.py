@@ -1,14 +1,14 @@
-"""How a run goes, while it goes: one live line on a terminal, a plain line now and then elsewhere."""
+"""How a run or a discovery goes, while it goes: one live line on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from gecar.evolution.history import Generation, pace
 from gecar.evolution.scores import UNSOLVED
@@ -59,6 +59,49 @@ class Watch:
         elif not self.quiet and time.monotonic() - self._said > PLAIN_EVERY_S:
             self._said = time.monotonic()
             self.console.print(line(self.history, self.generations), soft_wrap=True)
+
+
+class Steps:
+    """Shows what a long command does: on a terminal in one line, with the time since it began.
+
+    Parameters
+    ----------
+    say
+        What prints a step where there is no terminal.
+    console
+        Where the line is shown; default: stderr.
+    """
+
+    def __init__(self, say: Callable[[str], None], console: Console | None = None) -> None:
+        self.say = say
+        self.live = None
+        console = console or Console(stderr=True, highlight=False)
+        if console.is_terminal:
+            columns = (
+                SpinnerColumn(),
+                TimeElapsedColumn(),
+                TextColumn("{task.description}", style="dim", markup=False),
+            )
+            self.live = Progress(*columns, console=console, transient=True)
+            self.task = self.live.add_task("starting ...", total=None)
+
+    def __enter__(self) -> Self:
+        if self.live:
+            self.live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.live:
+            self.live.stop()
+
+    def __call__(self, step: str) -> None:
+        """Show a step that begins or has ended."""
+        if self.live:
+            self.live.update(self.task, description=step.strip())
+        else:
+            self.say(step)
 
 
 def line(history: Sequence[Generation], generations: int) -> str:

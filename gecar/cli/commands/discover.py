@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from gecar.cli.output import JsonOption, Output
-from gecar.errors import InputError, expected
+from gecar.errors import InputError, expected, one_of
 from gecar.reality.materiality import DEFAULT, Material
 
 
@@ -99,6 +99,7 @@ def discover(
     """
     from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller
     from gecar.cli.inputs import find_program, warnings_of
+    from gecar.cli.progress import Steps
     from gecar.language.program import read_program
     from gecar.parallel.executors import usable_cores
     from gecar.reality.invent.sentences import physics_grammar
@@ -145,7 +146,8 @@ def discover(
     if kind != "serial" or len(tasks) > 1:
         conclude_all(output, tasks, kind, workers or usable_cores(), scheduler)
         return
-    told = conclude(tasks[out], out, teller(output))
+    with Steps(teller(output)) as tell:
+        told = conclude(tasks[out], out, tell)
     say(output, told, out)
     output.print_json(told.table)
 
@@ -163,7 +165,7 @@ def effects_named(names: str, option: str = "--without") -> list[str]:
     found = [name.strip() for name in names.split(",") if name.strip()]
     for name in found:
         if name not in BY_ID:
-            raise expected(option, f"'{name}'", f"an effect of the catalogue: {', '.join(BY_ID)}")
+            raise one_of(option, name, BY_ID)
     return found
 
 

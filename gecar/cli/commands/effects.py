@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gecar.cli.output import JsonOption, Output
-from gecar.errors import expected
+from gecar.errors import expected, one_of
 
 if TYPE_CHECKING:
     from gecar.world.effects import Effect
@@ -49,7 +49,7 @@ def effects(
         raise expected("effects", f"'{' '.join(words or [])}'", "`show` and one effect's name")
     effect = named[0] if named else None
     if effect is not None and effect not in BY_ID:
-        raise expected("effect", f"'{effect}'", f"one of {', '.join(BY_ID)}")
+        raise one_of("effect", effect, BY_ID)
     if effect is not None:
         _describe(output, BY_ID[effect])
         if show:

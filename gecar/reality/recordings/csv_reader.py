@@ -16,6 +16,7 @@ from gecar.reality.recordings.columns import COLUMNS, Series
 # A million rows of ten columns: three hours at 100 Hz. Parsed a block of lines at a time, so that a file of
 # this size takes under 400 MB.
 MOST_BYTES = 64 * 1024 * 1024
+_SEPARATORS = {";": "semicolons", "\t": "tabs"}
 _BLOCK_LINES = 20_000
 _NOT_A_NUMBER = re.compile(r"[^0-9eE+\-., \t\n]")
 
@@ -67,7 +68,9 @@ def _header(path: Path, line: str) -> tuple[list[str], list[str]]:
     """Return the column names, and a warning for each column that means nothing here."""
     names = [name.strip() for name in line.split(",")]
     if "t_s" not in names and not difflib.get_close_matches("t_s", names, 1, 0.75):
-        raise _no_recording(path, f"{path}, line 1: found {_short(line)}")
+        separator = next((word for sign, word in _SEPARATORS.items() if sign in line), "")
+        between = f" with {separator} between columns" if separator else ""
+        raise _no_recording(path, f"{path}, line 1: found {_short(line)}{between}")
     warnings = []
     for k, name in enumerate(names):
         where = f"{path}, line 1, column {k + 1}"

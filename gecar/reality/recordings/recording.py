@@ -178,7 +178,8 @@ def _found_instead(folder: Path) -> str:
     """Say what a folder without recordings holds, and what to do with logs in it."""
     logs = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in LOGS)
     if not logs:
-        return "no .csv file"
+        within = sorted({f"{file.parent.name}/" for file in folder.glob("*/*.csv")})
+        return f"no .csv file, but some in {', '.join(within[:3])}" if within else "no .csv file"
     return (
         f"no .csv file but {', '.join(logs[:3])} (first gecar import {folder / ('*' + Path(logs[0]).suffix)})"
     )
