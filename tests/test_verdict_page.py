@@ -328,3 +328,11 @@ def test_curves_are_saved_as_csv(pages: dict[str, Path], tmp_path: Path) -> None
     assert link is not None
     assert link.group(1).endswith(".curves.csv")
     assert link.group(2).startswith("t_s%2Cx_measured_mm%2Cx_before_mm%2Cx_after_mm")
+
+
+def test_notes_of_the_page_name_effects_in_words() -> None:
+    verdict = verdict_on(*CASES["late"])
+    noted = replace(verdict, notes=("duty_curve explains the fitted recordings.", "See next_recording."))
+    page = article(noted, told("late").choices)
+    assert f"“{html.escape(BY_ID['duty_curve'].title)}” explains the fitted recordings." in page
+    assert "See next_recording." in page

@@ -7,6 +7,7 @@ import csv
 import html
 import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
@@ -139,7 +140,7 @@ def article(
     parts = [
         _found(verdict),
         _why(made),
-        f"<h2>What to record next</h2><p>{_text(_capital(verdict.next_recording.why))}. {commands}</p>",
+        f"<h2>What to record next</h2><p>{_text(_capital(_in_words(verdict.next_recording.why)))}. {commands}</p>",
         _how(verdict, tables, shown),
     ]
     return f"<div class='verdict'><style>{_STYLE}</style>{''.join(parts)}</div>"
@@ -147,6 +148,16 @@ def article(
 
 def _text(words: str) -> str:
     return html.escape(words)
+
+
+def _in_words(sentence: str) -> str:
+    """Return a sentence with effects by their titles, in quotation marks, instead of by their ids."""
+    return re.sub(r"\b[a-z]+(?:_[a-z]+)+\b|\bbacklash\b", _quoted_title, sentence)
+
+
+def _quoted_title(found: re.Match[str]) -> str:
+    name = found.group()
+    return f"“{BY_ID[name].title}”" if name in BY_ID else name
 
 
 def _capital(words: str) -> str:
@@ -163,7 +174,7 @@ def _found(verdict: Verdict) -> str:
     if verdict.minor:
         rows = "".join(f"<li>{_one(minor, verdict)}</li>" for minor in verdict.minor)
         parts.append(f"<h2>Visible, but too small to be material</h2><ul>{rows}</ul>")
-    notes = "".join(f"<li>{_text(note)}</li>" for note in verdict.notes)
+    notes = "".join(f"<li>{_text(_in_words(note))}</li>" for note in verdict.notes)
     return "".join(parts) + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
 
 

@@ -101,6 +101,8 @@ def _paths(axes: Axes, found: Gap) -> None:
     if found.simulated_s is not None:
         bold = {"linewidth": 2.0, "zorder": 5, "label": "simulation"}
         _way(axes, found.trials[0].simulated, whole, color=INK, **bold)
+    else:
+        axes.plot([], [], color=SOFT, linewidth=1.2, label="thin: its commands replayed")
     axes.legend(
         loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=min(5, len(found.trials) + 1), handlelength=2.6
     )
