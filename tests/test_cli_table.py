@@ -15,7 +15,15 @@ def test_a_table_is_written_in_every_form(gecar, tmp_path):
     assert [cell["runs"] for cell in answer["cells"]] == [2, 2, 2, 2]
     names = {path.name for path in (tmp_path / "new").iterdir()}
     pictures = {"convergence.png", "heat_map.png"}
-    tables = {"table.md", "table.csv", "table.tex", "table.json", "runs.csv", "contrasts.csv"}
+    tables = {
+        "table.md",
+        "table.csv",
+        "table.tex",
+        "table.json",
+        "runs.csv",
+        "contrasts.csv",
+        "contrasts.tex",
+    }
     assert names == {"study.json", "runs"} | tables | pictures
     assert len(list((tmp_path / "new/runs").iterdir())) == 8
 

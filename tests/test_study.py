@@ -7,13 +7,13 @@ import pytest
 from gecar.errors import InputError
 from gecar.parallel.run_parallel import Workplace
 from gecar.plots.runs.compare_runs import compare_runs
+from gecar.report.paper import latex
 from gecar.report.runs import summaries
 from gecar.report.table import (
     PAPER_TABLE_5,
     contrasted,
     contrasts_csv,
     csv_text,
-    latex,
     markdown,
     paper_figures,
 )

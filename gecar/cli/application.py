@@ -80,6 +80,9 @@ COMMANDS = (
     CommandEntry(
         "table", EVOLVE, "Run crossover x mutation x seeds: the paper's Table 5 and Fig. 5.", "table:table"
     ),
+    CommandEntry(
+        "report", EVOLVE, "Write a study's tables and figures for a paper, with provenance.", "report:report"
+    ),
     CommandEntry("check", EVOLVE, "Rerun a table of fitness figures and report changes.", "check:check"),
     CommandEntry("course", COURSES, "List, show, print and make courses.", "course:course"),
     CommandEntry("robot", COURSES, "List, show and make robots.", "robot:robot"),

@@ -49,6 +49,7 @@ LOOK: Any = {
     "legend.frameon": False,
     "lines.linewidth": 1.6,
     "lines.solid_capstyle": "round",
+    "pdf.fonttype": 42,  # TrueType, as journals ask for
     "savefig.dpi": DPI,
     "text.color": INK,
     "xtick.color": SOFT,
@@ -136,7 +137,8 @@ def picture(figure: Figure, kind: str = "png") -> bytes:
     stream = io.BytesIO()
     settle(figure)
     with look():
-        figure.savefig(stream, format=kind, facecolor=PAPER)
+        undated = {"CreationDate": None} if kind == "pdf" else None  # the same figure, the same file
+        figure.savefig(stream, format=kind, facecolor=PAPER, metadata=undated)
     return stream.getvalue()
 
 

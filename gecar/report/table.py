@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from rich.markup import escape
@@ -32,6 +32,12 @@ ARRIVE = (
     "the share of drives under fresh conditions in which a run's best program arrives (median over the runs)"
 )
 """What a table's shares are."""
+FULL_NOTE = (
+    f"A run without GOAL counts as slower than any in mean, median and worst; arrive is {ARRIVE}; "
+    "sd is of the runs at GOAL. "
+    "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
+)
+"""What the table of all figures holds."""
 _RUN_COLUMNS = (
     "fitness_s", "solved", "found_in_generation", "evaluations", "distinct_evaluations", "simulated_steps", "wall_s",
 )  # fmt: skip
@@ -60,7 +66,7 @@ def terminal_table(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[flo
 
 
 def markdown(
-    study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float], about: str
+    study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float], shared: str
 ) -> str:
     """Write the table as Markdown: in the paper's form first, then all figures.
 
@@ -70,10 +76,10 @@ def markdown(
         What was varied, and what came of it.
     paper
         The paper's figures, or none.
-    about
-        One line on what stayed.
+    shared
+        What `about` says.
     """
-    blocks = [f"# {_letters(study)}", about, _matrix(study, cells, paper), _full(study, cells, paper)]
+    blocks = [f"# {_letters(study)}", shared, _matrix(study, cells, paper), _full(study, cells, paper)]
     p = difference_p(study, cells)
     if p is not None:
         blocks.append(f"Do the cells differ at all? Friedman over the seeds: p = {p:.2g}.")
@@ -112,18 +118,22 @@ def contrasted(study: Study, cells: Sequence[Cell]) -> list[Compared]:
 
 def contrasts(study: Study, compared: Sequence[Compared]) -> str:
     """Write comparisons as Markdown."""
-    lines = [[*_axes(study), "against", "A12", "p"]]
+    lines = [[*axes_words(study), "against", "A12", "p"]]
     for cell, first, test, p in compared:
         against = f"{first.row}, {first.column}"
         lines.append([str(cell.row), str(cell.column), against, f"{test.a12:.2f}", f"{p:.2g}"])
+    return f"{piped(lines)}\n\n{contrasts_note(compared)}"
+
+
+def contrasts_note(compared: Sequence[Compared]) -> str:
+    """Say what the figures of comparisons are."""
     tests = {
         "Wilcoxon's signed ranks over the seeds" if each.test.paired else "Mann-Whitney" for each in compared
     }
-    note = (
+    return (
         "A12 is how often a run is faster than one of the cell it is set against (Vargha and Delaney; 0.5 is no "
         f"difference), p that of {' or '.join(sorted(tests))}, corrected by Holm."
     )
-    return f"{piped(lines)}\n\n{note}"
 
 
 def contrasts_csv(study: Study, compared: Sequence[Compared]) -> str:
@@ -135,22 +145,6 @@ def contrasts_csv(study: Study, compared: Sequence[Compared]) -> str:
     for cell, first, test, p in compared:
         out.writerow([cell.row, cell.column, first.row, first.column, test.a12, test.p, p, test.paired])
     return stream.getvalue()
-
-
-def latex(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
-    """Write the table of all figures for LaTeX; it needs the package booktabs."""
-    head, *rows = ([_escaped(word) for word in line] for line in _full_lines(study, cells, paper))
-    body = [" & ".join(line) + r" \\" for line in rows]
-    columns = "l" * 2 + "r" * (len(head) - 2)
-    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", " & ".join(head) + r" \\", r"\midrule", *body]
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
-
-
-_MARKS = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-
-
-def _escaped(word: str) -> str:
-    return re.sub(r"[\\~^&%$#_{}]", lambda mark: _MARKS.get(mark[0], "\\" + mark[0]), word)
 
 
 def csv_text(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
@@ -200,6 +194,22 @@ def as_table(
     }
 
 
+def about(study: Study, run: Planned, cells: Sequence[Cell]) -> str:
+    """Say in a line what all runs share."""
+    config, search = run.config, run.config.search
+    varied = {study.rows.name, study.columns.name}
+    parts = [
+        f"{name} {Path(str(getattr(config, name))).stem}"
+        for name in ("course", "preset")
+        if name not in varied
+    ]
+    if not varied & {"population", "generations"}:
+        parts.append(f"{search.population} programs, {search.generations} generations")
+    runs = sorted({len(cell.records) for cell in cells})
+    parts.append(f"{runs[0]} seeds a cell" if len(runs) == 1 else f"{runs[0]} to {runs[-1]} seeds a cell")
+    return " · ".join(parts)
+
+
 def setting_words(name: str) -> str:
     """Return a setting's name as people say it."""
     return name.replace("_", " ")
@@ -215,12 +225,13 @@ def _letters(study: Study) -> str:
     return f"{rows.capitalize()} x {columns}, {len(study.seeds)} seeds"
 
 
-def _axes(study: Study) -> list[str]:
+def axes_words(study: Study) -> list[str]:
+    """Return what rows and columns vary, in words."""
     return [setting_words(study.rows.name), setting_words(study.columns.name)]
 
 
 def _heads(study: Study, paper: Mapping[tuple[float, float], float]) -> list[str]:
-    return [*_axes(study), *_HEADINGS, *(["paper [s]"] if paper else [])]
+    return [*axes_words(study), *_HEADINGS, *(["paper [s]"] if paper else [])]
 
 
 def _words(cell: Cell, paper: Mapping[tuple[float, float], float]) -> list[str]:
@@ -264,15 +275,10 @@ def _matrix(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, flo
 
 
 def _full(study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]) -> str:
-    note = (
-        f"A run without GOAL counts as slower than any in mean, median and worst; arrive is {ARRIVE}; "
-        "sd is of the runs at GOAL. "
-        "Evaluations and simulated (programs that no earlier one answered) are medians over the runs."
-    )
-    return piped(_full_lines(study, cells, paper)) + f"\n\n{note}"
+    return piped(full_lines(study, cells, paper)) + f"\n\n{FULL_NOTE}"
 
 
-def _full_lines(
+def full_lines(
     study: Study, cells: Sequence[Cell], paper: Mapping[tuple[float, float], float]
 ) -> list[list[str]]:
     """Return head and rows of the table, medians with their intervals."""

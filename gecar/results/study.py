@@ -68,9 +68,12 @@ class Planned:
     @property
     def configuration(self) -> str:
         """Hash of all that the result depends on."""
-        return identify(
-            self.config, _fingerprints(self.config.grammar, self.config.course, self.config.robot)
-        )
+        return identify(self.config, self.fingerprints)
+
+    @property
+    def fingerprints(self) -> dict[str, str]:
+        """Hashes of its grammar, course and robot."""
+        return _fingerprints(self.config.grammar, self.config.course, self.config.robot)
 
     @property
     def file(self) -> str:
@@ -98,6 +101,11 @@ class Study:
     rows: Axis = TABLE_5[0]
     columns: Axis = TABLE_5[1]
     seeds: tuple[int, ...] = (1, 2, 3, 4, 5)
+
+    @property
+    def axes(self) -> tuple[Axis, Axis]:
+        """What varies over the rows, and over the columns."""
+        return self.rows, self.columns
 
     def config(self, row: Any, column: Any, seed: int) -> Config:
         """Return the configuration of one run.

@@ -22,12 +22,13 @@ from gecar.parallel.executors import check_workers, usable_cores
 from gecar.parallel.run_parallel import Workplace
 from gecar.plots.runs.study_table import convergences, heat_map
 from gecar.plots.style import save
+from gecar.report.paper import contrasts_latex, latex
 from gecar.report.table import (
+    about,
     as_table,
     contrasted,
     contrasts_csv,
     csv_text,
-    latex,
     markdown,
     paper_figures,
     runs_csv,
@@ -158,17 +159,18 @@ def _tell(
     loaded = [folder.load(run) for run in runs]
     records = [record for record in loaded if record is not None]
     cells, paper = cells_of(runs, loaded), paper_figures(wanted, runs)
-    about = _about(wanted, runs[0], cells)
+    shared = about(wanted, runs[0], cells)
     answer = as_table(wanted, cells, paper)
-    write_whole(folder.path / "table.md", markdown(wanted, cells, paper, about))
+    write_whole(folder.path / "table.md", markdown(wanted, cells, paper, shared))
     write_whole(folder.path / "table.csv", csv_text(wanted, cells, paper))
     write_whole(folder.path / "runs.csv", runs_csv(wanted, cells))
     write_whole(folder.path / "table.tex", latex(wanted, cells, paper))
     compared = contrasted(wanted, cells)
     if compared:
         write_whole(folder.path / "contrasts.csv", contrasts_csv(wanted, compared))
+        write_whole(folder.path / "contrasts.tex", contrasts_latex(wanted, compared))
     write_whole(folder.path / "table.json", json_text(answer))
-    drawn = draw(wanted, cells, paper, about, folder.path) if pictures else []
+    drawn = draw(wanted, cells, paper, shared, folder.path) if pictures else []
     warning = other_versions(records)
     if warning:
         print(f"warning: {warning}", file=sys.stderr)
@@ -180,7 +182,9 @@ def _tell(
     evaluations = sum(record["evaluations"] for record in records)
     busy = sum(record["wall_s"] for record in records)
     output.print(f"{evaluations:,} evaluations; {wall_s:.0f} s now, {busy:.0f} s of one worker in all")
-    output.print(f"\nTable:    {folder.path / 'table.md'}  (also .csv, .tex, .json, runs.csv, contrasts.csv)")
+    output.print(
+        f"\nTable:    {folder.path / 'table.md'}  (also .csv, .tex, .json, runs.csv, contrasts.csv, .tex)"
+    )
     for picture in drawn:
         output.print(f"Picture:  {picture}")
     output.print_json(
@@ -188,30 +192,14 @@ def _tell(
     )
 
 
-def draw(wanted: Study, cells: Sequence[Cell], paper: Any, about: str, folder: Path) -> list[Path]:
+def draw(wanted: Study, cells: Sequence[Cell], paper: Any, shared: str, folder: Path) -> list[Path]:
     """Draw convergence and heat map into a folder; return their files."""
     names = setting_words(wanted.rows.name), setting_words(wanted.columns.name)
     solved, total = sum(cell.solved for cell in cells), sum(len(cell.records) for cell in cells)
     title = f"{solved} of {total} runs at GOAL"
-    curves = convergences(cells, names, paper, f"Best time to GOAL [s]: {title}", about)
-    heat = heat_map(cells, names, paper, f"Mean time to GOAL ± sd [s]: {title}", about)
+    curves = convergences(cells, names, paper, f"Best time to GOAL [s]: {title}", shared)
+    heat = heat_map(cells, names, paper, f"Mean time to GOAL ± sd [s]: {title}", shared)
     return [save(curves, folder / "convergence.png"), save(heat, folder / "heat_map.png")]
-
-
-def _about(wanted: Study, run: Planned, cells: Sequence[Cell]) -> str:
-    """Say in a line what all runs share."""
-    config, search = run.config, run.config.search
-    varied = {wanted.rows.name, wanted.columns.name}
-    parts = [
-        f"{name} {Path(str(getattr(config, name))).stem}"
-        for name in ("course", "preset")
-        if name not in varied
-    ]
-    if not varied & {"population", "generations"}:
-        parts.append(f"{search.population} programs, {search.generations} generations")
-    runs = sorted({len(cell.records) for cell in cells})
-    parts.append(f"{runs[0]} seeds a cell" if len(runs) == 1 else f"{runs[0]} to {runs[-1]} seeds a cell")
-    return " · ".join(parts)
 
 
 class _Watch:
