@@ -35,10 +35,14 @@ def history(best):
     }
 
 
-def test_sizes_depths_and_diversity_are_drawn_whole():
+def test_sizes_depths_diversity_and_shares_are_drawn_whole():
     rising = {name: np.linspace(1.0, 5.0, 40) for name in ("size", "depth", "entropy")}
-    figure = population_figure({"generation": np.arange(40.0), **rising}, 40, "A title", "a detail")
+    shares = {"valid": np.linspace(0.5, 1.0, 40), "distinct": np.linspace(1.0, 0.1, 40)}
+    columns = {"generation": np.arange(40.0), **rising, **shares}
+    figure = population_figure(columns, 40, "A title", "a detail")
     assert style.is_whole(figure)
+    valid, distinct = figure.axes[-1].get_lines()
+    assert (valid.get_ydata()[-1], distinct.get_ydata()[-1]) == pytest.approx((100.0, 10.0))
 
 
 @pytest.mark.parametrize("program", [LAPS, ENDLESS], ids=["short", "long"])

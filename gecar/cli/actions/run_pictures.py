@@ -13,6 +13,7 @@ from gecar.cli.inputs import build_world, drive_seed, find_program, read_run_con
 from gecar.cli.output import Output
 from gecar.errors import expected
 from gecar.evolution.lineage import Member
+from gecar.evolution.representation import measure, random_genomes
 from gecar.language.program import Program, read_program
 from gecar.plots.courses.many import courses_figure
 from gecar.plots.drives.classroom import write_classroom_page
@@ -24,13 +25,14 @@ from gecar.plots.runs.evolution_film import Champion, choose_shown, film_evoluti
 from gecar.plots.runs.front import archive_figure, front_figure
 from gecar.plots.runs.genealogy import genealogy
 from gecar.plots.runs.population import population_figure
+from gecar.plots.runs.representation import representation_figure, representation_title
 from gecar.plots.style import save
 from gecar.report.drive import PAPER_BEST_S, detail_of, title_of
 from gecar.report.runs import came_to, group_names, run_detail, run_title, summaries, summary_table
 from gecar.results.ancestry import Ancestry, read_ancestry
 from gecar.results.arrival import arriving, percent, share_of, shares
 from gecar.results.config import Config
-from gecar.results.folder import FRONT_FILE, UNSEEN_FILE, read_history, read_result
+from gecar.results.folder import FRONT_FILE, UNSEEN_FILE, RunFolder, read_history, read_result
 from gecar.results.front import read_front
 from gecar.results.generalisation import CourseDrive, read_drives, summed_up
 from gecar.results.run import Task, load_task
@@ -113,9 +115,9 @@ def draw_drives(drives: Sequence[CourseDrive], target: Path, kind: str = "unseen
 
 
 def study_run(folder: Path, out: Path | None = None) -> list[Path]:
-    """Draw all of a run's pictures: of `draw_run`, its populations, its best program's derivation and ancestors."""
+    """Draw all of a run's pictures: of `draw_run`, its populations, locality, its best's derivation and ancestors."""
     target = out or folder
-    drawn = draw_run(folder, target)
+    drawn = [*draw_run(folder, target), draw_locality(folder, target / "locality.png")]
     if "size" in read_history(folder):
         drawn.append(draw_population(folder, target / "population.png"))
     if read_result(folder)["program"]:
@@ -139,6 +141,19 @@ def draw_population(folder: Path, target: Path) -> Path:
     config, result = read_run_config(folder), read_result(folder)
     title, detail = "Size, depth and diversity of the populations", run_detail(config, result)
     return save(population_figure(read_history(folder), config.search.population, title, detail), target)
+
+
+def draw_locality(folder: Path, target: Path) -> Path:
+    """Draw the locality and redundancy of random genomes, and of a run's last population if it was kept."""
+    config = read_run_config(folder)
+    task = load_task(config)
+    state = RunFolder(folder).load(task.configuration)
+    genomes = {"random genomes": random_genomes(task.mapper, config.search.codons, seed=config.seed)}
+    if state is not None:
+        genomes["last population"] = state.genomes
+    found = {name: measure(task.mapper, each, seed=config.seed) for name, each in genomes.items()}
+    detail = f"grammar {Path(config.grammar).stem}, preset {config.preset}, seed {config.seed}"
+    return save(representation_figure(found, representation_title(found["random genomes"]), detail), target)
 
 
 def draw_trajectory(folder: Path, target: Path) -> Path:

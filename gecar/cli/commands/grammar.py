@@ -182,6 +182,71 @@ def map_genomes(
     )
 
 
+@grammar.command()
+def locality(
+    name: GrammarArgument,
+    count: Annotated[int, typer.Option("--count", help="Number of random genomes, and of mutants.")] = 5000,
+    length: Annotated[int, typer.Option("--codons", help="Codons of each genome.")] = 1000,
+    seed: Annotated[int, typer.Option("--seed", help="Random seed.")] = 1,
+    wraps: WrapsOption = 0,
+    single_choice_consumes: ConsumesOption = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw it to a .png, .pdf or .svg file.", show_default=False),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Measure locality and redundancy: what one changed codon changes, and how many genomes share a phenotype.
+
+    Distances count words of the grammar to insert, delete or replace. Of a run, gecar plot also draws the population.
+
+    [bold]Examples[/]
+
+      gecar grammar locality paper --picture locality.png
+      gecar grammar locality santa_fe --codons 200 --json
+    """
+    import numpy as np
+
+    from gecar.evolution.representation import measure
+
+    output = Output(as_json)
+    mapper = _mapper(name, wraps, single_choice_consumes)
+    found = measure(mapper, np.array(_random_genomes(count, length, seed)), count, seed)
+    if picture is not None:
+        from gecar.plots.runs.representation import representation_figure, representation_title
+        from gecar.plots.style import picture_kind, save
+
+        picture_kind(picture)
+        detail = f"grammar {Path(name).stem}, {count:,} random genomes"
+        save(representation_figure({"random genomes": found}, representation_title(found), detail), picture)
+    figures = found.figures()
+    for words, value in _in_words(figures):
+        output.print(f"{words:58} {value}")
+    if picture is not None:
+        output.print(f"Picture: {picture}")
+    output.print_json({**figures, "picture": None if picture is None else str(picture)})
+
+
+def _in_words(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what was measured of a representation, in words."""
+    shares = {
+        "genomes that map to a phenotype": "valid",
+        "mutants of the same phenotype (neutral)": "neutral",
+        "mutants that differ by one word": "one_word",
+        "mutants that map to no phenotype": "invalid",
+        "genomes with the most frequent phenotype": "most_frequent",
+    }
+    numbers = {
+        "codons used, median": "codons_used_median",
+        "words by which other mutants differ, median": "changed_distance_median",
+        "the same, mean": "changed_distance_mean",
+        "different phenotypes": "phenotypes",
+        "entropy of the phenotypes [bits]": "entropy_bits",
+    }
+    told = [(words, f"{100.0 * figures[key]:.3g} %") for words, key in shares.items()]
+    return told + [(words, f"{figures[key]:,.4g}") for words, key in numbers.items()]
+
+
 def summary(loaded: Grammar) -> dict[str, Any]:
     """Return a grammar's figures, ready for JSON."""
     from gecar.language.robot_language import check_robot_language

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,6 +36,10 @@ def plot(
         _file("--tree", "Draw only the named pictures: the best program's derivation; .png, .pdf or .svg."),
     ] = None,
     genealogy: Annotated[Path | None, _file("--genealogy", "... its ancestors; .png, .pdf or .svg.")] = None,
+    locality: Annotated[
+        Path | None,
+        _file("--locality", "... what a changed codon changes, and how many genomes share a program."),
+    ] = None,
     evolution: Annotated[
         Path | None, _file("--evolution", "... a film of the best program by generation; .gif or .mp4.")
     ] = None,
@@ -46,7 +51,8 @@ def plot(
 ) -> None:
     """Draw a run's pictures, or compare several runs.
 
-    One run: convergence, and the best program's drive, derivation and genealogy. Runs that differ only in their seed
+    One run: convergence, populations, locality and redundancy of the genomes, and the best program's drive, derivation
+    and genealogy. Runs that differ only in their seed
     are drawn together: median and interquartile range.
 
     [bold]Examples[/]
@@ -57,7 +63,7 @@ def plot(
       gecar plot runs/paper-*  --out figures
     """
     output = Output(as_json)
-    named = {"--tree": tree, "--genealogy": genealogy, "--evolution": evolution}
+    named = {"--tree": tree, "--genealogy": genealogy, "--locality": locality, "--evolution": evolution}
     if len(runs) > 1:
         _compare(output, runs, out or Path(), {**named, "--html": page})
     else:
@@ -82,20 +88,22 @@ def _study(output: Output, run: Path, out: Path, named: dict[str, Path | None], 
     """Draw what is named of a run, or everything."""
     from gecar.cli.actions.run_pictures import (
         draw_genealogy,
+        draw_locality,
         draw_tree,
         film_run,
         study_run,
         write_drive_page,
     )
 
-    tree, genealogy, evolution = named.values()
-    _check_endings(tree, genealogy, evolution)
+    tree, genealogy, locality, evolution = named.values()
+    _check_endings((tree, genealogy, locality), evolution)
     made: dict[str, list[Path]] = {"pictures": [], "films": [], "pages": []}
     if not any(named.values()):
         made["pictures"] += study_run(run, out)
     made["pages"] += [write_drive_page(run, out / "drive.html")] if page else []
     made["pictures"] += [draw_tree(run, tree)] if tree else []
     made["pictures"] += [draw_genealogy(run, genealogy)] if genealogy else []
+    made["pictures"] += [draw_locality(run, locality)] if locality else []
     made["films"] += [film_run(run, evolution)] if evolution else []
     output.print_json({kind: [str(path) for path in paths] for kind, paths in made.items()})
     for kind, paths in made.items():
@@ -103,12 +111,12 @@ def _study(output: Output, run: Path, out: Path, named: dict[str, Path | None], 
             output.print(f"{kind.capitalize().removesuffix('s')}: {path}")
 
 
-def _check_endings(tree: Path | None, genealogy: Path | None, evolution: Path | None) -> None:
+def _check_endings(pictures: Sequence[Path | None], evolution: Path | None) -> None:
     """Refuse what cannot be drawn before anything is."""
     from gecar.plots.drives.animation import check_film
     from gecar.plots.style import picture_kind
 
-    for picture in filter(None, (tree, genealogy)):
+    for picture in filter(None, pictures):
         picture_kind(picture)
         picture.parent.mkdir(parents=True, exist_ok=True)
     if evolution:
