@@ -13,11 +13,12 @@ from typing import Any
 
 from gecar.displayed import Displayed
 from gecar.errors import InputError, expected
-from gecar.evolution.ask_tell import Evolution, rehearse, run
+from gecar.evolution.ask_tell import Evolution, run
 from gecar.evolution.history import Generation
+from gecar.evolution.operators import Operators
 from gecar.evolution.state import Best, Candidate
 from gecar.language.grammar import Grammar
-from gecar.language.mapping import Mapper
+from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.program import Program, parse_program, read_program
 from gecar.language.robot_language import check_robot_language
 from gecar.reality.discovery import discover as find_missing
@@ -138,6 +139,8 @@ def evolve(
     motor_noise_pct: float = 0.0,
     time_limit_s: float = 60.0,
     start_from: Sequence[str | Path | Program | Run] = (),
+    operators: Operators | None = None,
+    mapping: MappingOptions | Mapper | None = None,
     out: str | Path | None = None,
     tell: Tell = lambda generation: None,  # noqa: ARG005
 ) -> Run:
@@ -163,16 +166,23 @@ def evolve(
         Time after which a drive without GOAL ends [s].
     start_from
         Programs that every new population holds: programs, texts, files, or runs.
+    operators
+        Operators in the place of those that the settings name; ``Operators.of(settings, mutation=mine)`` adds the rest.
+    mapping
+        How codons are read: options, such as wraps, codon size or genomes of any length; or a mapper, such as
+        `gecar.language.structured.StructuredMapper`, whose grammar is then the one evolved.
     out
         A new folder for the files of ``gecar evolve``; by default nothing is written. Then course, grammar and robot
-        must be names or files, and the fitness eq. 1, because a run is resumed from its folder.
+        must be names or files, the fitness eq. 1, and operators and mapping those of the settings, because a run is
+        resumed from its folder.
     tell
         Called with each generation's record.
 
     Raises
     ------
     InputError
-        If there is no such course, grammar, robot, preset or setting, a value is out of bounds, or the folder exists.
+        If there is no such course, grammar, robot, preset or setting, a value is out of bounds, the folder exists, or
+        operators and mapping do not go together.
     """
     preset, changes = _preset(settings)
     options: dict[str, Any] = {
@@ -182,11 +192,17 @@ def evolve(
     }  # fmt: skip
     if workers is not None:
         options["workers"] = workers
-    made = {"course": course, "grammar": grammar, "robot": robot}
+    if isinstance(mapping, Mapper):
+        grammar = mapping.grammar
+    if start_from and (operators is not None or isinstance(mapping, Mapper)):
+        found = "programs beside operators or a mapper"
+        raise expected("start_from", found, "one of the two; Seeded initialises from given genomes")
+    made = {"course": course, "grammar": grammar, "robot": robot, "operators": operators, "mapping": mapping}
+    given = {kind: thing for kind, thing in made.items() if thing is not None}
     objects: dict[str, Any] = {
-        kind: thing for kind, thing in made.items() if not isinstance(thing, str | Path)
+        kind: thing for kind, thing in given.items() if not isinstance(thing, str | Path)
     }
-    names = {kind: str(thing) for kind, thing in made.items() if kind not in objects}
+    names = {kind: str(thing) for kind, thing in given.items() if kind not in objects}
     config = configure({**options, **names}, "evolve")
     if out is not None:
         return _evolve_into(Path(out), config, objects, fitness, tell)
@@ -303,13 +319,20 @@ def _preset(settings: str | Mapping[str, Any] | Settings) -> tuple[str, Mapping[
 
 
 def _task(
-    config: Config, course: Course | None = None, grammar: Grammar | None = None, robot: Robot | None = None
+    config: Config,
+    course: Course | None = None,
+    grammar: Grammar | None = None,
+    robot: Robot | None = None,
+    operators: Operators | None = None,
+    mapping: MappingOptions | Mapper | None = None,
 ) -> Task:
     """Load what a configuration names, and put objects in the place of the rest."""
     task = load_task(config)
     if grammar is not None:
         check_robot_language(grammar)
-        task = replace(task, mapper=Mapper(grammar, task.mapper.options))
+    if not isinstance(mapping, Mapper):
+        mapping = Mapper(grammar or task.mapper.grammar, mapping or task.mapper.options)
+    task = replace(task, mapper=mapping, own=operators)
     world = replace(task.world, course=course or task.world.course, robot=robot or task.world.robot)
     others = tuple(replace(other, robot=world.robot) for other in task.others)
     return replace(task, world=world, others=others)
@@ -320,7 +343,10 @@ def _evolve_into(
 ) -> Run:
     """Evolve into a folder, as ``gecar evolve`` does."""
     if objects:
-        raise expected("out", f"a {next(iter(objects))} made in Python", "its name or its file")
+        kind = next(iter(objects))
+        wanted = "its name or its file" if kind in ("course", "grammar", "robot") else "those of the settings"
+        found = kind if kind == "operators" else f"a {kind}"
+        raise expected("out", f"{found} made in Python", wanted)
     if fitness is not None:
         raise expected(
             "out",
@@ -346,7 +372,7 @@ def _search_by(fitness: Fitness, task: Task, evolution: Evolution[Program], tell
             [c.program.opcodes for c in asked], [c.seed for c in asked], generation=len(evolution.history)
         )
 
-    rehearse(settings, task.mapper, task.problem)
+    task.rehearse()
     run(evolution, scores, tell)
     if settings.draws > 1:
         evolution.choose(evolution.contenders[0])

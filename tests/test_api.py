@@ -7,6 +7,16 @@ from pathlib import Path
 import pytest
 
 import gecar
+from gecar.errors import InputError
+from gecar.evolution.crossover import VariableOnePoint
+from gecar.evolution.initialisation import Sensible, Uniform
+from gecar.evolution.mutation import Flip
+from gecar.evolution.operators import Operators
+from gecar.evolution.selection import Tournament
+from gecar.evolution.settings import EvolutionSettings
+from gecar.evolution.structured import GeneCrossover, GeneFlip
+from gecar.language.mapping import MappingOptions
+from gecar.language.structured import StructuredMapper
 from gecar.world.rollout import Outcome
 
 PROGRAM = "if(SensorValue > 80):\n    motor(70,90,0)\nelse:\n    motor(40,-100,30)\n"
@@ -49,6 +59,43 @@ def test_objects_stand_for_names():
     by_name = gecar.evolve("hairpin", settings=SMALL)
     assert by_object.world.course is course
     assert str(by_object.program) == str(by_name.program)
+
+
+def test_operators_of_ones_own_are_used():
+    class Counted(Flip):
+        calls = 0
+
+        def __call__(self, genomes, mapper, streams):
+            Counted.calls += 1
+            return super().__call__(genomes, mapper, streams)
+
+    settings = EvolutionSettings(population=8, generations=2)
+    found = gecar.evolve(settings=SMALL, operators=Operators.of(settings, mutation=Counted(0.05)))
+    assert Counted.calls == 2  # generations; no rehearsal
+    assert len(found.history) == 3
+
+
+def test_codons_are_read_as_the_mapping_says():
+    wide = MappingOptions(codon_size=1_000, variable_length=True)
+    ponyge2 = Operators(
+        Sensible(200, 6, tail=0.5), Tournament(2), (VariableOnePoint(0.75), Flip(None, within_used=True))
+    )
+    found = gecar.evolve(settings=SMALL, mapping=wide, operators=ponyge2)
+    assert found.best.genome.max() > 255
+    genes = StructuredMapper(gecar.load_grammar("proportional"), gene=8, depth=9)
+    by_genes = Operators(Uniform(genes.codons), Tournament(2), (GeneCrossover(0.9), GeneFlip(0.05)))
+    found = gecar.evolve(settings=SMALL | {"restart": "random"}, mapping=genes, operators=by_genes)
+    assert len(found.best.genome) == genes.codons
+
+
+def test_operators_and_mappings_that_do_not_go_together_are_refused(tmp_path):
+    operators = Operators.of(EvolutionSettings())
+    with pytest.raises(InputError, match="operators made in Python, expected those of the settings"):
+        gecar.evolve(operators=operators, out=tmp_path / "run")
+    with pytest.raises(InputError, match="start_from"):
+        gecar.evolve(operators=operators, start_from=[PROGRAM])
+    with pytest.raises(InputError, match="StructuredMapper"):
+        gecar.evolve(mapping=StructuredMapper(gecar.load_grammar("paper"), gene=8, depth=9))
 
 
 def test_a_fitness_of_ones_own_is_what_evolution_minimises():

@@ -90,7 +90,8 @@ class Evolution(Generic[P]):
             raise expected("problem", "one beside a phenotype or a fitness", "either the one or the others")
         settings = settings or EvolutionSettings()
         operators = operators or Operators.of(settings)
-        operators.check(mapper, problem.n_cases)
+        grows = settings.restart_after > 0 and settings.restart == "grown"
+        operators.check(mapper, problem.n_cases, grows)
         self.settings, self.mapper, self.problem, self.seed = settings, mapper, problem, seed
         self.operators = operators
         self.history: list[Generation] = []

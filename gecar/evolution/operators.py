@@ -113,8 +113,8 @@ class Operators:
         algorithm = _algorithm(self.replace)
         return algorithm if isinstance(algorithm, MapElites) else None
 
-    def check(self, mapper: Mapper, n_cases: int) -> None:
-        """Check that the operators suit a mapper and scores.
+    def check(self, mapper: Mapper, n_cases: int, grows: bool = False) -> None:
+        """Check that the operators suit a mapper and scores; those of `grow` if they are used.
 
         Raises
         ------
@@ -129,10 +129,14 @@ class Operators:
             if isinstance(algorithm, MapElites) and len(algorithm.ranges) != n_cases - 1:
                 found = f"{len(algorithm.ranges)} ranges for {n_cases} cases"
                 raise expected("map_elites", found, "a range for each case but the first")
-        for operator in self.vary:
+        for operator in (*self.vary, *(self.grow if grows else ())):
             if getattr(operator, "linear", False) and not mapper.linear:
                 found = f"{type(operator).__name__} for a {type(mapper).__name__}"
-                raise expected("operators", found, "operators on genes, such as GeneCrossover and GeneFlip")
+                raise expected(
+                    "operators",
+                    found,
+                    "operators on genes, such as GeneCrossover and GeneFlip; restart = random",
+                )
 
 
 def _algorithm(operator: Any) -> Any:

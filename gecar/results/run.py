@@ -46,13 +46,17 @@ from gecar.world.rollout import Noise, World, simulate
 
 @dataclass(frozen=True)
 class Task:
-    """A configuration, and what its names stand for; ``others`` are the worlds of further courses."""
+    """A configuration, and what its names stand for.
+
+    ``others`` are the worlds of further courses; ``own`` are operators in the place of those the settings name.
+    """
 
     config: Config
     mapper: Mapper
     world: World
     fingerprints: Mapping[str, str]
     others: tuple[World, ...] = ()
+    own: Operators | None = None
 
     @property
     def configuration(self) -> str:
@@ -96,6 +100,11 @@ class Task:
             return Evolution(self.mapper, self.problem, search, self.config.seed, operators=self.operators)
         return Evolution.resume(state, self.mapper, self.problem, search, self.operators)
 
+    def rehearse(self) -> None:
+        """Compile everything before time is measured; operators from elsewhere are not called before the run is."""
+        if self.own is None:
+            rehearse(self.config.search, self.mapper, self.problem)
+
     def front(self, evolution: Evolution[Program]) -> Front:
         """Return the programs that a finished evolution with several goals ends with."""
         return measure_front(evolution, self.world, self.config.search, self.others)
@@ -109,6 +118,8 @@ class Task:
         InputError
             If the grammar has no derivation for one of them.
         """
+        if self.own is not None:
+            return self.own
         search = self.config.search
         if search.replacement == "map_elites" and not search.ranges:
             search = search.model_copy(update={"ranges": ranges_of(self.world, search.goals[1:])})
@@ -271,9 +282,8 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
 
 def search(task: Task, evolution: Evolution[Program], after: Callable[[Generation], None]) -> None:
     """Run an evolution to its last generation on the task's executor; nothing is written."""
-    config = task.config
     with Batches(task.evaluator, partial(open_executor, *task.place), side_by_side(*task.place)) as batches:
-        rehearse(config.search, task.mapper, task.problem)
+        task.rehearse()
         batches.warm()
         run(evolution, batches, after)
 
