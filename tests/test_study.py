@@ -197,6 +197,14 @@ def test_holms_correction_is_that_of_his_paper():
     assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
 
 
+def test_holms_correction_is_that_of_statsmodels():
+    multitest = pytest.importorskip("statsmodels.stats.multitest", reason="needs pip install 'gecar[test]'")
+    rng = np.random.default_rng(1)
+    for n in (1, 2, 9, 40):
+        p = np.round(rng.random(n) ** 3, 2)  # with ties, 0 and 1
+        assert holm(p) == pytest.approx(multitest.multipletests(p, method="holm")[1])
+
+
 def test_an_even_number_of_seeds_has_one_median_in_tables_pictures_and_reports():
     times, runs = (10.0, 20.0, 30.0, 1e4), study(seeds=(1, 2, 3, 4)).plan()
     cell = cells_of(runs, [record(run, times[run.config.seed - 1]) for run in runs])[0]

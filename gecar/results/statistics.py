@@ -54,7 +54,10 @@ def contrast(cell: Cell, other: Cell) -> Contrast:
 
 
 def holm(p: Sequence[float]) -> Floats:
-    """Return p-values corrected for their number (Holm 1979), shape (tests,)."""
+    """Return p-values corrected for their number (Holm 1979), shape (tests,).
+
+    SciPy has no such function, and statsmodels, which has, would bring pandas along; a test holds both equal.
+    """
     order = np.argsort(p)
     stepped = np.asarray(p, float)[order] * np.arange(len(p), 0, -1)
     corrected = np.empty(len(p))
