@@ -1,6 +1,7 @@
 """Any problem: the worked examples of the documents, fitnesses of all kinds, operators and representations."""
 
 import json
+import random
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -22,6 +23,7 @@ from gecar.evolution.structured import GeneCrossover, GeneFlip
 from gecar.language.grammar import load_grammar, parse_grammar
 from gecar.language.mapping import Mapper, MappingOptions
 from gecar.language.structured import StructuredMapper
+from gecar.problems import regression
 from gecar.problems.ant import FOOD, missed, read_ant
 from gecar.problems.regression import keijzer_6, read_formula, vladislavleva_4
 from gecar.random_streams import generators, spawn
@@ -335,3 +337,40 @@ def test_the_benchmarks_are_those_of_the_literature() -> None:
     assert vladislavleva(formula) < 1e-12
     assert vladislavleva.unseen(formula) < 1e-12
     assert vladislavleva.x.shape == (5, 1_024)
+
+
+def test_compiled_reading_of_formulas_is_that_of_pythons_own():
+    draw = random.Random(3)
+    words = (
+        *"+-*/(),.x1",
+        "pdiv",
+        "psqrt",
+        "sin",
+        "exp",
+        "12.50",
+        "007.25",
+        "3.",
+        "2x",
+        "_a",
+        "é",
+        "\x1c",
+        " ",
+        "#",
+        "٣",
+    )
+    words += ("12345678901234567890", "0.00000000000000000000000000001", "99.999999")
+    n = 0
+    for _ in range(3_000):
+        text = "".join(draw.choice(words) for _ in range(draw.randint(1, 9)))
+        for variables in (("x",), ("x", "x1"), ("x", "sin"), ("a b", "x")):
+            steps, values = regression._postfix(*regression._words_of(text, variables))
+            formula = read_formula(text, variables)
+            assert (formula is None) == (len(steps) == 0)
+            if formula is not None:
+                n += 1
+                assert (formula.codes == steps).all()
+                assert (formula.values == values).all()
+    assert n > 500
+    for _ in range(3_000):
+        number = f"{draw.randint(0, 10 ** draw.randint(0, 9))}.{draw.randint(0, 10**7)}"
+        assert read_formula(number).values[0] == float(number)

@@ -32,6 +32,12 @@ TOURNAMENT, CROSSOVER, MUTATION = 5, 0.8, 0.01
 DEPTH, DEEPEST = 10, 35
 """Depth of first trees at most; of all trees, where a library wants to know."""
 CODONS = 1_000
+GRAPE_ALIKE = Operators(
+    Sensible(CODONS, DEPTH, tail=0.5),
+    Tournament(TOURNAMENT),
+    (VariableOnePoint(CROSSOVER), Flip(MUTATION, within_used=True)),
+)
+"""GRAPE's operators."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +69,7 @@ CASES = {
 def gecar_alike(case: Case, seed: int) -> Ended:
     """Run gecar with the operators that GRAPE has."""
     mapper = Mapper(load_grammar(case.grammar), MappingOptions(variable_length=True))
-    operators = Operators(
-        Sensible(CODONS, DEPTH, tail=0.5),
-        Tournament(TOURNAMENT),
-        (VariableOnePoint(CROSSOVER), Flip(MUTATION, within_used=True)),
-    )
-    return _gecar(case, seed, mapper, operators)
+    return _gecar(case, seed, mapper, GRAPE_ALIKE)
 
 
 def gecar_subtree(case: Case, seed: int) -> Ended:

@@ -393,8 +393,9 @@ class Evolution(Generic[P]):
         digests = {i: p.digest for i, p in enumerate(offspring.phenotypes) if p is not None}
         known = [i for i, digest in digests.items() if digest not in self._asked]
         scores[known] = self._cache.look_up([digests[i] for i in known])
-        for members, score in zip(self._asked.values(), told, strict=True):
-            scores[members] = score
+        members = list(self._asked.values())
+        asked = np.repeat(np.arange(len(told)), np.array([len(each) for each in members], int))
+        scores[[i for each in members for i in each]] = told[asked]
         return scores
 
     def _record(self, offspring: Offspring[P], told: Scores, evaluations: int) -> None:
@@ -404,7 +405,7 @@ class Evolution(Generic[P]):
             self.totals.steps + int(told["steps"].sum()),
         )
         programs = [phenotype.digest for phenotype in offspring.phenotypes if phenotype is not None]
-        mapped = self.mapper.map(offspring.genomes)
+        mapped = offspring.mapped or self.mapper.map(offspring.genomes)
         record = summary(
             len(self.history), self.scores, programs, mapped, totals, self._wall_s(), self.problem.failure
         )

@@ -29,8 +29,18 @@ def lengths(genomes: Genomes, mapper: Mapper) -> Int32s:
     """Return how many codons each genome has (genomes,)."""
     if not mapper.options.variable_length:
         return np.full(len(genomes), genomes.shape[1], np.int32)
-    ended = genomes < 0
-    return np.where(ended.any(axis=1), ended.argmax(axis=1), genomes.shape[1]).astype(np.int32)
+    return _lengths(genomes)
+
+
+@compiled
+def _lengths(genomes: Genomes) -> Int32s:
+    found = np.full(genomes.shape[0], genomes.shape[1], np.int32)
+    for i in range(genomes.shape[0]):
+        for k in range(genomes.shape[1]):
+            if genomes[i, k] < 0:
+                found[i] = k
+                break
+    return found
 
 
 @dataclass(frozen=True)

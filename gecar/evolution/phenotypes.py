@@ -41,7 +41,10 @@ class Phenotypes(Generic[P]):
 
     def read(self, genomes: npt.NDArray[Any]) -> list[Phenotype[P] | None]:
         """Return each genome's phenotype; None where it maps to no program."""
-        mapped = self.mapper.map(genomes)
+        return self.of(self.mapper.map(genomes))
+
+    def of(self, mapped: Mapped) -> list[Phenotype[P] | None]:
+        """Return the phenotype of each of some genomes that were mapped."""
         return [self._phenotype(mapped, i) if mapped.valid[i] else None for i in range(len(mapped))]
 
     def turn(self) -> None:

@@ -18,7 +18,7 @@ from gecar.evolution.problem import P, Problem
 from gecar.evolution.scores import Scores, merits
 from gecar.evolution.selection import Population
 from gecar.evolution.settings import EvolutionSettings
-from gecar.language.mapping import Mapper
+from gecar.language.mapping import Mapped, Mapper
 from gecar.random_streams import Streams, spawn
 
 Bytes = npt.NDArray[np.uint8]
@@ -42,6 +42,8 @@ class Offspring(Generic[P]):
         Which operators changed the derivation (population,), as bits; see `gecar.evolution.lineage`.
     copied, islands
         Whether each is a copy, and its island (population,).
+    mapped
+        What the genomes derive; None where it is not at hand.
     """
 
     genomes: Genomes
@@ -50,9 +52,12 @@ class Offspring(Generic[P]):
     changed: Bytes
     copied: npt.NDArray[np.bool_]
     islands: Int32s
+    mapped: Mapped | None = None
 
     def part(self, places: Int32s) -> Offspring[P]:
-        """Return the individuals at some places."""
+        """Return the individuals at some places, each at most once and in order; itself where those are all."""
+        if len(places) == len(self.genomes):
+            return self
         phenotypes = [self.phenotypes[place] for place in places.tolist()]
         return Offspring(
             self.genomes[places],
@@ -209,18 +214,21 @@ class Reproduction(Generic[P]):
         """Draw individuals, and replace duplicates, as often as the settings allow."""
         self._phenotypes.turn()
         genomes, parents, changed = draw(0)
-        phenotypes = self._phenotypes.read(genomes)
+        derived = self.mapper.map(genomes)
+        phenotypes = self._phenotypes.of(derived)
         attempts = 0 if self.settings.duplicates == "kept" else self.settings.attempts
         simulated = known if self.settings.duplicates == "run" else _never
+        mapped: Mapped | None = derived
         for attempt in range(1, attempts + 1):
             again = _duplicates(phenotypes, copied, simulated)
             if not again:
                 break
+            mapped = None
             drawn = draw(attempt)
             genomes[again], parents[again], changed[again] = (each[again] for each in drawn)
             for i, phenotype in zip(again, self._phenotypes.read(genomes[again]), strict=True):
                 phenotypes[i] = phenotype
-        return Offspring(genomes, phenotypes, parents, changed, copied, islands)
+        return Offspring(genomes, phenotypes, parents, changed, copied, islands, mapped)
 
 
 def _duplicates(

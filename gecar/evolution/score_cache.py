@@ -41,18 +41,21 @@ class ScoreCache:
 
     def add(self, digests: Sequence[bytes], scores: Scores) -> None:
         """Keep the scores of programs; of those known already, the new ones."""
-        for digest, score in zip(digests, scores, strict=True):
-            if digest in self._rows:
-                self._scores[self._rows[digest]] = score
-                continue
-            if len(self._digests) < CAPACITY:
-                self._digests.append(digest)
-            else:
-                del self._rows[self._digests[self._next]]
-                self._digests[self._next] = digest
-            self._rows[digest] = self._next
-            self._scores[self._next] = score
-            self._next = (self._next + 1) % CAPACITY
+        self._scores[[self._row(digest) for digest in digests]] = scores
+
+    def _row(self, digest: bytes) -> int:
+        """Return the row of a program's score, a new one or the oldest's if it has none."""
+        if digest in self._rows:
+            return self._rows[digest]
+        row = self._next
+        if len(self._digests) < CAPACITY:
+            self._digests.append(digest)
+        else:
+            del self._rows[self._digests[row]]
+            self._digests[row] = digest
+        self._rows[digest] = row
+        self._next = (row + 1) % CAPACITY
+        return row
 
     def dump(self) -> tuple[npt.NDArray[np.uint8], Scores]:
         """Return digests (n, 16) and scores (n,), the oldest first."""

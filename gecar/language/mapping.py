@@ -212,7 +212,8 @@ class Mapped:
 
     def key(self, i: int) -> bytes:
         """Return genome i's choices as bytes; equal keys, equal phenotypes. Empty if it is invalid."""
-        return self.choices[self.offsets[i] : self.offsets[i + 1]].tobytes()
+        raw, ends = self._raw
+        return raw[ends[i] : ends[i + 1]]
 
     def text(self, i: int) -> str:
         """Write genome i's phenotype.
@@ -224,9 +225,20 @@ class Mapped:
         """
         if not self.valid[i]:
             raise expected(f"genome {i}", "a derivation that does not finish", "a valid genome")
-        begins, numbers = self.words
+        begins, numbers = self._listed
         words = self.mapper.words
-        return "".join([words[k] for k in numbers[begins[i] : begins[i + 1]].tolist()])
+        return "".join([words[k] for k in numbers[begins[i] : begins[i + 1]]])
+
+    @cached_property
+    def _raw(self) -> tuple[bytes, list[int]]:
+        """All choices as bytes, and where each genome's begin: an array's slices take longer one by one."""
+        return self.choices.tobytes(), (self.choices.itemsize * self.offsets).tolist()
+
+    @cached_property
+    def _listed(self) -> tuple[list[int], list[int]]:
+        """`words` as lists, for the same reason."""
+        begins, numbers = self.words
+        return begins.tolist(), numbers.tolist()
 
     @cached_property
     def words(self) -> tuple[Int64s, Int32s]:

@@ -57,6 +57,7 @@ TRAIL = """
 """
 FOOD: npt.NDArray[np.bool_] = np.array([[cell == "#" for cell in line] for line in TRAIL.split()])
 """Where it lies at first (32, 32)."""
+_PIECES = int(FOOD.sum())
 
 LEFT, RIGHT, MOVE, LOOK, JUMP, END = range(6)
 _WORDS = {"left;": LEFT, "right;": RIGHT, "move;": MOVE, "if(food_ahead){": LOOK, "}else{": JUMP, "}": END}
@@ -140,7 +141,7 @@ def missed(ant: Ant, steps: int = STEPS) -> int:
     steps
         How many moves and turns it has.
     """
-    return int(FOOD.sum()) - _eaten(ant.rows, FOOD.copy(), steps)
+    return _PIECES - _eaten(ant.rows, FOOD.copy(), steps)
 
 
 @compiled

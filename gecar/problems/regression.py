@@ -8,6 +8,7 @@ log(1 + abs(a)).
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,6 +21,7 @@ from gecar.language.mapping import Derivation
 
 Floats = npt.NDArray[np.float64]
 Int32s = npt.NDArray[np.int32]
+Bytes = npt.NDArray[np.uint8]
 
 MAX_CHARACTERS = 10_000
 """Longest text that is read as a formula."""
@@ -76,14 +78,25 @@ def read_formula(text: object, variables: tuple[str, ...] = ("x",)) -> Formula |
     text = str(text)
     if len(text) > MAX_CHARACTERS:
         return None
+    names = _names(variables)
+    steps, numbers, n = np.empty(len(text), np.int32), np.empty(len(text)), -1
+    if text.isascii() and names is not None:
+        n = _read(np.frombuffer(text.encode(), np.uint8), *names, steps, numbers)
+    if n < 0:
+        steps, numbers = _postfix(*_words_of(text, variables))
+        n = len(steps)
+    return Formula(text, steps[:n], numbers[:n]) if n else None
+
+
+def _words_of(text: str, variables: tuple[str, ...]) -> tuple[Int32s, Floats]:
+    """Return what each word of a text is, and its value, whatever its characters and numbers."""
     known = _words(variables)
     codes, values = [], []
     for word in _WORD.findall(text):
         code, value = known.get(word) or (CONSTANT if word[0].isdigit() else -1, 0.0)
         codes.append(code)
         values.append(float(word) if code == CONSTANT else value)
-    steps, numbers = _postfix(np.array(codes, np.int32), np.array(values, float))
-    return Formula(text, steps, numbers) if len(steps) else None
+    return np.array(codes, np.int32), np.array(values, float)
 
 
 @cache
@@ -91,6 +104,101 @@ def _words(variables: tuple[str, ...]) -> dict[str, tuple[int, float]]:
     """Return what each word but numbers stands for: its code, and of a variable the number."""
     words = {word: (code, 0.0) for word, code in _WORDS.items()}
     return words | {name: (VARIABLE, float(k)) for k, name in enumerate(variables)}
+
+
+@cache
+def _names(variables: tuple[str, ...]) -> tuple[Bytes, Int32s, Int32s, Floats] | None:
+    """Return the names in a formula as `_lex` takes them; None where a variable is no plain name."""
+    if not all(name.isascii() and name.isidentifier() for name in variables):
+        return None
+    known = {name: meaning for name, meaning in _words(variables).items() if name.isidentifier()}
+    ends = np.cumsum([0, *map(len, known)]).astype(np.int32)
+    codes, values = zip(*known.values(), strict=True)
+    return np.frombuffer("".join(known).encode(), np.uint8), ends, np.array(codes, np.int32), np.array(values)
+
+
+@compiled
+def _read(
+    text: Bytes, names: Bytes, ends: Int32s, meanings: Int32s, values: Floats, steps: Int32s, numbers: Floats
+) -> int:
+    """Write an ASCII text's formula in postfix order; return its length, 0 if it is none, -1 as `_lex`."""
+    n = _lex(text, names, ends, meanings, values, steps, numbers)
+    if n < 0:
+        return n
+    found, its_values = _postfix(steps[:n], numbers[:n])
+    for k in range(found.size):
+        steps[k], numbers[k] = found[k], its_values[k]
+    return found.size
+
+
+@compiled
+def _lex(  # noqa: C901, PLR0912
+    text: Bytes, names: Bytes, ends: Int32s, meanings: Int32s, numbers: Floats, codes: Int32s, values: Floats
+) -> int:
+    """Find a text's words; return how many, or -1 where a number has more digits than are read exactly here.
+
+    Parameters
+    ----------
+    text
+        Its ASCII characters.
+    names, ends, meanings, numbers
+        All names, one after the other, and where each ends; what each is, and its value.
+    codes, values
+        Receive what each word is, and its value.
+    """
+    n, at = 0, 0
+    while at < text.size:
+        letter = text[at]
+        if letter == 32 or 9 <= letter <= 13 or 28 <= letter <= 31:
+            at += 1
+            continue
+        begin, code, value = at, -1, 0.0
+        at += 1
+        if 48 <= letter <= 57:
+            whole, digits, decimals, point = letter - 48.0, int(letter > 48), 0, False
+            while at < text.size and (48 <= text[at] <= 57 or (text[at] == 46 and not point)):
+                if text[at] == 46:
+                    point = True
+                else:
+                    whole = 10.0 * whole + (text[at] - 48.0)
+                    digits += digits > 0 or text[at] > 48
+                    decimals += point
+                at += 1
+            if digits > 15 or decimals > 22:
+                return -1
+            scale = 1.0  # up to 10^22 and 10^15 both are exact, so that their quotient is the nearest number
+            for _ in range(decimals):
+                scale *= 10.0
+            code, value = CONSTANT, whole / scale
+        elif letter == 95 or 65 <= letter <= 90 or 97 <= letter <= 122:
+            while at < text.size and (
+                text[at] == 95 or 48 <= text[at] <= 57 or 65 <= text[at] <= 90 or 97 <= text[at] <= 122
+            ):
+                at += 1
+            for k in range(meanings.size):
+                if _same(text[begin:at], names[ends[k] : ends[k + 1]]):
+                    code, value = meanings[k], numbers[k]
+        else:
+            for k in range(_SIGNS.size):
+                if letter == _SIGNS[k]:
+                    code = _SIGN_CODES[k]
+        codes[n], values[n] = code, value
+        n += 1
+    return n
+
+
+_SIGNS = np.frombuffer(b"+-*/(),", np.uint8)
+_SIGN_CODES = np.array([_WORDS[chr(sign)] for sign in _SIGNS], np.int32)
+
+
+@compiled
+def _same(one: Bytes, other: Bytes) -> bool:
+    if one.size != other.size:
+        return False
+    for k in range(one.size):  # noqa: SIM110  Numba compiles no generators
+        if one[k] != other[k]:
+            return False
+    return True
 
 
 @compiled
@@ -224,7 +332,7 @@ class Regression:
 
     def __call__(self, formula: Formula) -> float:
         """Return the error on the cases to fit."""
-        return _root_mean_square(formula(self.x) - self.y)
+        return _root_mean_square(formula, self.x, self.y)
 
     def errors(self, formula: Formula) -> Floats:
         """Return the error of each case, for lexicase (cases,)."""
@@ -232,12 +340,21 @@ class Regression:
 
     def unseen(self, formula: Formula) -> float:
         """Return the error on the cases set aside."""
-        return _root_mean_square(formula(self.unseen_x) - self.unseen_y)
+        return _root_mean_square(formula, self.unseen_x, self.unseen_y)
 
 
-def _root_mean_square(missed: Floats) -> float:
+def _root_mean_square(formula: Formula, x: Floats, y: Floats) -> float:
+    squares = _squares(formula.codes, formula.values, x, y)
     with np.errstate(all="ignore"):
-        return float(np.sqrt(np.mean(missed * missed)))
+        return math.sqrt(np.add.reduce(squares) / len(squares))
+
+
+@compiled
+def _squares(codes: Int32s, values: Floats, x: Floats, y: Floats) -> Floats:
+    missed = _work_out(codes, values, x)
+    for k in range(missed.size):
+        missed[k] = (missed[k] - y[k]) * (missed[k] - y[k])
+    return missed
 
 
 def keijzer_6() -> Regression:
