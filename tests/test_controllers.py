@@ -32,15 +32,17 @@ def test_numbers_become_the_programs_they_say() -> None:
     text = controllers.if_else((80.4, 70, 90, 0, 40, -90, 20))
     assert text == "if(SensorValue > 80):\n    motor(70,90,0)\nelse:\n    motor(40,-90,20)"
     assert parse_program(controllers.linear((60, 0.5, 60, -0.5, 50, 10)))
-    assert parse_program(controllers.BY_HAND)
+    assert all(map(parse_program, controllers.BY_HAND))
 
 
-@pytest.mark.parametrize("method", [2, 3, 4])
-def test_every_method_spends_its_budget_and_no_more(method: int, monkeypatch) -> None:
-    if method < 4:
+@pytest.mark.parametrize(
+    "method", [name for name in controllers.METHODS if name.startswith(("CMA", "random"))]
+)
+def test_every_method_spends_its_budget_and_no_more(method: str, monkeypatch) -> None:
+    if method.startswith("CMA"):
         pytest.importorskip("cma", reason="needs pip install 'gecar[bench]'")
     monkeypatch.setattr(controllers, "Contest", Counting)
-    _, find = list(controllers.METHODS.values())[method]
+    _, find = controllers.METHODS[method]
     task = load_task(configure({"preset": "better", "seed": 5}))
     assert find(task, 57) == find(task, 57)
     assert len(made[-1].texts) == len(made[-2].texts) == 57
@@ -55,3 +57,15 @@ def test_a_program_met_again_is_scored_from_all_its_drives() -> None:
         (value,) = contest([text])
         assert 25 < value < 27
         assert np.count_nonzero(~np.isnan(contest.known[text][1]["drawn_s"])) == drives
+
+
+def test_methods_are_compared_run_by_run_over_all_courses() -> None:
+    def results(*times):
+        return [{"median_s": time, "share": 0.0 if time is None else 1.0} for time in times]
+
+    found = {(course, name): results(10.0, 20.0, None) for course in "ab" for name in controllers.METHODS}
+    slower = "random search, an if/else's 7 numbers"
+    found["a", slower], found["b", slower] = results(11.0, 26.0, None), results(12.0, None, None)
+    (line,) = [line for line in controllers.paired(found, "ab") if line[0] == slower]
+    assert line[1:4] == ["4", "6", "1.20"]
+    assert float(line[4]) > 0.05  # six pairs, corrected for six tests
