@@ -67,6 +67,7 @@ from gecar.world.ports import (
 )
 
 MOST_CHARACTERS = 300
+_NUMBER = re.compile(r"(?<!\w)\.?\d")
 POINT = ("at_x", "at_y")
 _MARKS: Mapping[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
@@ -367,6 +368,8 @@ def _pretty(formula: str) -> str:
 
 def _named(law: str, taken: Mapping[str, Any]) -> tuple[str, dict[str, float]]:
     """Return a law with names in the place of the numbers written in it, and those numbers by name."""
+    if not _NUMBER.search(law):
+        return law, {}
     try:
         tree = ast.parse(law.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,7 @@ class FreeTerms:
         return tuple(term.with_constants(v) for term, v in zip(self.terms, values, strict=True))
 
 
+@lru_cache(maxsize=8192)
 def usual_size(term: Term) -> float:
     """Return the size of a linear constant whose law gives about a hundredth of what is much at its port."""
     at_one = term.with_constants(dict.fromkeys(linear(term), 1.0))

@@ -39,7 +39,7 @@ from gecar.reality.invent.sentences import (
 )
 from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
 from gecar.reality.selection.problem import Problem
-from gecar.world.ports import BY_PORT, N_TERMS
+from gecar.world.ports import BY_PORT, CONSTANTS, N_TERMS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +49,7 @@ TOGETHER = 64  # laws whose residuals are held at a time
 SMALL_RESPONSE, LARGE_RESPONSE = 0.02, 1.0  # standard deviations: a derivative is taken between
 UNEVEN = 2.0  # times as much or as little a size as before: then a derivative at none says nothing
 FINITE = (-160.0, -80.0, -40.0, -20.0, 20.0, 40.0, 80.0, 160.0)  # sizes that are tried then, in `usual_size`s
-KEPT_COLUMNS = 400
+KEPT_COLUMNS = 1200
 KEPT_LAWS = 40  # of those tried one by one, and of those evolved
 PORTS_KEPT = 0.3  # of the best law's gain: what a port's best law must gain for evolution to look there
 A_TOKEN = 1.5  # log-likelihood that a token or a constant of a law must bring: a choice among a handful
@@ -209,12 +209,15 @@ class Library:
         return best
 
     def _changes(self, parts: Sequence[Term], sizes: Array) -> Array:
-        records = []
-        for part, size in zip(parts, sizes.tolist(), strict=True):
-            sized = part.with_constants({linear(part)[0]: size * usual_size(part)})
-            free = FreeTerms(self.model.parameters, self.model.z, (sized,))
-            records.append(free.physics(free.z))
-        errors = self.problem.residuals.errors_of_each(np.concatenate(records))
+        """Return how residuals change with laws of one part whose constants are so many `usual_size`s."""
+        records = np.repeat(self.model.physics, len(parts))
+        own = int(records["n_terms"][0])
+        records["n_terms"] = own + 1
+        for k, (part, size) in enumerate(zip(parts, sizes.tolist(), strict=True)):
+            records["terms"][k, own] = part.row
+            slot = CONSTANTS + part.free.index(linear(part)[0])
+            records["terms"][k, own, slot] = size * usual_size(part)
+        errors = self.problem.residuals.errors_of_each(records)
         out: Array = self.problem.estimator.whitened(errors) - self.model.errors
         return out
 
@@ -333,7 +336,7 @@ def _greedy_sums(library: Library, singles: Sequence[Laws]) -> list[Laws]:
             if not sums:
                 break
             best = max(sums, key=lambda term: library.gain((term,)))
-            chosen = pieces(best)
+            chosen = list(pieces(best))
             out.append((best,))
     return out
 

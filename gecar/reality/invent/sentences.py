@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from gecar.errors import InputError, expected
@@ -17,6 +18,7 @@ Laws = tuple[Term, ...]
 
 SHIPPED = "physics"
 SINGLE = 5  # most choices of laws that are tried one by one
+_KEPT = 32768  # sentences, and keys of laws, that are not worked out anew
 _SHORT = 30  # choices within which every alternative must come to an end
 _FREE = re.compile(r"\bc\b")
 _LINEAR = re.compile(r"\bc\d+\b")
@@ -46,6 +48,7 @@ def physics_grammar(file: str = SHIPPED) -> Grammar:
     return grammar
 
 
+@lru_cache(maxsize=_KEPT)
 def read_sentence(sentence: str) -> Laws:
     """Read a sentence ``port: formula; store: formula; store_s: seconds; at: x y`` as terms whose constants are 1.
 
@@ -88,9 +91,11 @@ def linear(term: Term) -> list[str]:
     return [name for name in term.constants if _LINEAR.fullmatch(name)]
 
 
-def pieces(term: Term) -> list[Term]:
+@lru_cache(maxsize=_KEPT)
+def pieces(term: Term) -> tuple[Term, ...]:
     """Return the parts of a law's sum, each as a term of its own, with its one linear constant."""
-    return [_with_law(term, law, term.constants) for law in _PLUS.split(term.law)]
+    laws = _PLUS.split(term.law)
+    return tuple(_with_law(term, law, term.constants) for law in laws) if len(laws) > 1 else (term,)
 
 
 def parts_of(laws: Laws) -> list[Term]:
@@ -145,6 +150,7 @@ def complexity(laws: Laws) -> int:
     )
 
 
+@lru_cache(maxsize=_KEPT)
 def key(laws: Laws) -> str:
     """Return what is equal for laws that differ in linear constants, or in the order of their parts, alone."""
     return " & ".join(sorted(map(_key, parts_of(laws))))
