@@ -23,7 +23,7 @@ from gecar.reality import discovery
 from gecar.reality.discovery import discover
 from gecar.reality.invent.invention import Written
 from gecar.reality.invent.looks import looks_like
-from gecar.reality.invent.proof import simplified
+from gecar.reality.invent.proof import left_out_gains, simplified
 from gecar.reality.invent.search import Library, fit
 from gecar.reality.invent.sentences import (
     complexity,
@@ -40,6 +40,7 @@ from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import problem_of
+from gecar.reality.selection.thresholds import PRICE
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_html
 from gecar.world.effects import CATALOGUE
@@ -130,8 +131,8 @@ def test_what_has_no_derivative_at_none_is_found_by_finite_probes(hidden, size):
     assert law.spread < 0.1
 
 
-def library_of(*tables):
-    runs = [recorded(robot_with(*map(dict, tables)), seed) for seed in range(5)]
+def library_of(*tables, rig="floor"):
+    runs = [recorded(robot_with(*map(dict, tables)), seed, rig=rig) for seed in range(5)]
     fitted = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
     problem = problem_of(fitted, EV3, observable(UNRELATED, fitted))
     problem = problem.under(problem.known)
@@ -143,6 +144,36 @@ def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
     law = fit(library, library.started(read_sentence(sum_of_three)))
     assert [term.law for term in simplified(library, law)[0].terms] == ["c1 * speed * abs(speed)"]
+
+
+FAINT_RIPPLE = frozen(port="motor_torque", law="c1 * sin(2 * angle)", c1=1.5e-3)
+
+
+def test_on_a_bench_a_part_that_brings_little_of_the_gain_is_dropped():
+    library = library_of(DRAG, FAINT_RIPPLE, rig="bench")
+    whole = fit(
+        library, library.started(read_sentence("motor_torque: c * speed * abs(speed) + c * sin(2 * angle)"))
+    )
+    law, gains = simplified(library, whole)
+    assert [term.law for term in law.terms] == ["c1 * speed * abs(speed)"]
+    assert left_out_gains(library, whole).sum() - gains.sum() > PRICE
+
+
+ONE_MOTOR = parse_grammar(
+    """
+    <term> ::= motor_torque: c * <f> | motor_torque: c * sin(1 * angle) + c * cos(1 * angle); side: each
+    <f> ::= speed * abs(speed) | side * speed * abs(speed) | other_speed | load | turn_rate | x | command
+    """
+)
+
+
+def test_of_one_motor_on_a_bench_no_law_speaks_of_the_other_side_or_the_floor():
+    runs = [recorded(robot_with(dict(DRAG)), seed, rig="bench") for seed in range(5)]
+    alone = tuple(replace(run, right_angle_rad=np.full(len(run.t_s), np.nan)) for run in runs)
+    (law,) = discover(Case("motor", alone), catalogue=UNRELATED, language=ONE_MOTOR, invents=True).invented
+    assert law.term.law == "c1 * speed * abs(speed)"
+    assert law.parameters["c1"].value == pytest.approx(-3e-4, rel=0.05)
+    assert {term.law for term in law.alternatives} == set()
 
 
 WHEELS_AND_LAG = parse_grammar(

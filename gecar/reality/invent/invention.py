@@ -46,6 +46,8 @@ HELPS = 0.85  # of what whole drives set aside part by without a law: with it th
 LAWS_LEAVE = 0.15  # share of the error without any: a law has not the cause's own form
 ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
+OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
+OF_PAIR = frozenset(("side", "other_angle", "other_speed"))  # and that one motor alone has not
 ON_FLOOR = frozenset(("force_x", "force_y", *TOWARD_A_POINT))  # ports that have the floor's axes
 
 
@@ -98,8 +100,7 @@ def invent(
         if len(here.problem.estimator.robot.term) == N_TERMS:
             break
         library = Library(here.problem, here.taken)
-        unknown = frozenset[str]() if _placed(problem) else OF_PLACE
-        found = search(library, grammar, ports, seed + number, tell, unknown)
+        found = search(library, grammar, ports, seed + number, tell, _unknown(problem))
         holds = _first_that_holds(written, explained, library, found, held, seed) if found else None
         if holds is None:
             break
@@ -122,6 +123,15 @@ def _ports(problem: Problem) -> list[str]:
         sensors |= {"gyro"} if any(3 in seen for seen in measured) else set()
     there = [port for port in PORTS if port.sensor in sensors and (port.on_bench or not problem.on_bench)]
     return [port.id for port in there if _placed(problem) or port.id not in ON_FLOOR]
+
+
+def _unknown(problem: Problem) -> frozenset[str]:
+    """Return the variables that say nothing in a problem's recordings, or the same as others."""
+    if not problem.on_bench:
+        return frozenset() if _placed(problem) else OF_PLACE
+    measured = {name for run in problem.recordings for name in run.measured}
+    both = {"left_angle_rad", "right_angle_rad"} <= measured
+    return OF_FLOOR if both else OF_FLOOR | OF_PAIR
 
 
 def _placed(problem: Problem) -> bool:

@@ -350,7 +350,9 @@ def _sum(parts: Sequence[Term]) -> Term | None:
 
 
 def _variables(laws: Laws) -> set[str]:
-    return {name for term in laws for name in term.parsed.variables}
+    """Return what laws look at; one of a single wheel looks at the side."""
+    sides = {"side" for term in laws if term.side != "both"}
+    return sides.union(*(term.parsed.variables for term in laws))
 
 
 class _Evolved(EvolvedProblem[Laws]):
