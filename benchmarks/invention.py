@@ -6,7 +6,9 @@ python -m benchmarks.invention runs/cases --out runs/invention
 Each case with one effect is looked at with a catalogue without it (``gecar discover --without``); all others with the
 whole catalogue; and a law is asked for in each (``--invent``). Of every case: the gap closed on recordings set aside,
 open loop; whether a law stands at a port where that physics acts (`PORTS_OF`, written before any case was drawn), and
-looks at the variables it depends on; the time it took. Goes on where it was stopped, and writes table.md.
+looks at the variables it depends on; the time it took. Goes on where it was stopped, and writes table.md. With
+``--material`` cases are left out whose concealed physics is too small to ask for a law: most, where robots have a
+background.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.sizes import is_material
 from gecar.files import json_ready, write_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.sentences import physics_grammar
@@ -107,6 +110,12 @@ def look_at(folder: Path, label: dict[str, Any], out: Path, seed: int = 0) -> di
     )
 
 
+def asks_for_a_law(label: dict[str, Any]) -> bool:
+    """Whether what a case conceals is material; one that conceals nothing asks that none is written, and counts."""
+    sizes = [size for name, size in label.get("size", {}).items() if name != "background"]
+    return not sizes or any(map(is_material, sizes))
+
+
 def port_right(case: dict[str, Any]) -> bool | None:
     """Whether a law, or one that can not be told from it, stands where the physics acts; None where nothing says."""
     if case["concealed"] not in PORTS_OF or not case["invented"]:
@@ -173,12 +182,17 @@ def main() -> None:
     parser.add_argument("cases", type=Path, help="as benchmarks.concealed draws them: cases/ and sealed/")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument(
+        "--material", action="store_true", help="leave out what is too small to ask for a law"
+    )
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     labels = {
         f.parent.name: json.loads(f.read_text())
         for f in sorted((given.cases / "sealed").glob("*/label.json"))
     }
+    if given.material:
+        labels = {name: label for name, label in labels.items() if asks_for_a_law(label)}
     waiting = [name for name in labels if not (given.out / f"{name}.json").exists()]
     with ProcessPoolExecutor(given.workers) as pool:
         jobs = {
