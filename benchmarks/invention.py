@@ -60,8 +60,12 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "load_transfer": (("wheel_load", "tyre_grip"), ("ahead", "aside", "turn_rate", "load")),
     "com_offset": (("yaw_moment", "wheel_load", "force_aside"), ("turn_rate", "ahead", "aside")),
     "sensor_gain": (("colour_reading",), ("", "reading")),
-    "off_centre_wheel": (("rolling_radius",), ("angle",)),
-    "oval_wheel": (("rolling_radius",), ("angle",)),
+    "viscous_asymmetry": (("motor_torque", "gear_friction"), ("speed",)),
+    "constant_torque": (("motor_torque",), ("",)),
+    "dead_band_asymmetry": (("command", "motor_torque"), ("command", "side")),
+    "duty_curve": (("command", "supply_voltage", "motor_torque"), ("command",)),
+    "off_centre_wheels": (("rolling_radius",), ("angle",)),
+    "oval_wheels": (("rolling_radius",), ("angle",)),
     "tether": (_FORCE, ("distance", "x", "y")),
     "magnet": (_FORCE, ("distance", "x", "y")),
     "wavy_floor": ((*_FORCE, "force_ahead"), ("x", "y")),
@@ -76,7 +80,16 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "yaw_pull": (("yaw_moment",), ("",)),
     "shared_drop": (("supply_voltage",), ("draw", "current", "command")),
     "carpet_pile": ((*_FORCE, "force_ahead", "yaw_moment"), ("heading", "")),
+    "duty_steps": (("command", "motor_torque"), ("command",)),
+    "dusty_tyres": (("tyre_grip", "wheel_load"), ("time", "x", "y")),
+    "damaged_tooth": (_MOTOR, ("angle",)),
+    "rubber_band": (_MOTOR, ("angle",)),
+    "hopping_wheel": (("tyre_grip", "wheel_load"), ("angle",)),
+    "coasting": (_MOTOR, ("command", "speed")),
+    "swivel_caster": (("force_aside", "yaw_moment"), ("turn_rate", "ahead", "aside")),
 }
+NO_PORT = ("swinging_sensor",)
+"""A place that swings: no port moves the sensor."""
 NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""
 

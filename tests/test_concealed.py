@@ -17,6 +17,7 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the concealed cases are not tested (pip install gecar[test])"
 )
 
+from benchmarks import invention
 from benchmarks.concealed import cases, commands, practice, program
 from benchmarks.concealed.colour_sensor import line_share
 from benchmarks.concealed.comparators.methods import METHODS, changed
@@ -24,16 +25,19 @@ from benchmarks.concealed.drive_train import DriveTrain
 from benchmarks.concealed.exam import Terms, agreed
 from benchmarks.concealed.history import replayed
 from benchmarks.concealed.judging import judge
+from benchmarks.concealed.outside import OUTSIDE
 from benchmarks.concealed.plan import Counts, draw_all, plan
 from benchmarks.concealed.results import write_results
 from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.runner import run_all
 from benchmarks.concealed.score import figures, score
+from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth
 from gecar.parallel import run_parallel
 from gecar.parallel.executors import SerialExecutor
 from gecar.reality.prove import confirmation
+from gecar.world.effects import CATALOGUE
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -303,3 +307,16 @@ def test_a_pass_that_takes_no_time_polls_when_it_is_asked_next():
     assert [turn(0.001 * k, reading) for k, reading in enumerate((100, 100, 10, 80))] == [
         (70, 80), (70, 80), (40, -80), (70, 80),
     ]  # fmt: skip
+
+
+def test_of_all_that_is_outside_the_catalogue_it_is_said_where_laws_of_it_stand():
+    said = {*invention.PORTS_OF, *invention.NO_LAW, *invention.NO_PORT}
+    assert {*OUTSIDE, *SEALED} <= said
+    assert said <= {*OUTSIDE, *SEALED, *(effect.id for effect in CATALOGUE)}
+
+
+def test_a_case_asks_for_a_law_where_what_it_conceals_is_material_or_nothing():
+    small, large = ({"mm_1m": mm, "deg_1m": 0.1, "reading_pct": 0.0} for mm in (1.0, 25.0))
+    assert invention.asks_for_a_law({"size": {"background": small}})
+    assert invention.asks_for_a_law({"size": {"tether": large, "background": small}})
+    assert not invention.asks_for_a_law({"size": {"tether": small, "background": large}})
