@@ -365,7 +365,17 @@ def _with_laws_on(
 ) -> _Stage:
     """Return a stage with this explanation in place of its own, and laws added to it."""
     written = invent(explained, held, language, context.seed, context.tell)
-    return replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
+    stage = replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
+    return replace(stage, spans=_spans(context, written.explained)) if written.terms else stage
+
+
+def _spans(context: _Context, explained: Explanation) -> Mapping[str, Mapping[str, Interval]]:
+    """Return the 95 % intervals of effects that were fitted anew beside laws."""
+    if not explained.steps:
+        return {}
+    spans = intervals(explained.problem.estimator, explained.taken, context.seed)
+    on_bench = explained.problem.on_bench
+    return along_valleys(explained.problem, explained.taken, spans) if on_bench else spans
 
 
 def _left(stage: _Stage) -> float:
