@@ -1,5 +1,7 @@
 """What `gecar discover` makes of recordings others made: ``python -m benchmarks.recorded [--recordings FOLDER]``.
 
+With ``--laws`` what laws gain on the real motors: the catalogue alone, laws beside it, and laws alone.
+
 Real motors, and practice cases of a 3D engine with their answers. All of them were looked at while gecar was made, so
 these figures are not blind; `benchmarks/concealed` is.
 """
@@ -16,9 +18,11 @@ from typing import Any
 import numpy as np
 
 from gecar.reality.discovery import discover
+from gecar.reality.invent.sentences import physics_grammar
 from gecar.reality.recordings.recording import read_case
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.verdict import Found, Verdict
+from gecar.world.effects import CATALOGUE, Effect
 
 BESIDE = Path(__file__).parents[2] / "shared" / "recordings"
 # Beyond the levels that are fitted, and between them; of the only record of EMPS the last part is set aside.
@@ -29,7 +33,14 @@ REAL: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("ev3_motor_b", ("step_+030", "step_+060")),
     ("emps", ()),
 )
+OF_LOG = ("clock_skew", "start_latency")  # effects of the log, not of the motor
+ARMS: tuple[tuple[str, tuple[Effect, ...], bool], ...] = (
+    ("catalogue", CATALOGUE, False),
+    ("catalogue and laws", CATALOGUE, True),
+    ("laws", tuple(effect for effect in CATALOGUE if effect.id in OF_LOG), True),
+)
 HEAD = "| case | concealed | found (95 %) | fitted on | judged on | NRMSE before | after | noise |\n"
+LAWS_HEAD = "| case | judged on | with | found | laws | NRMSE before | after | noise |\n"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,14 +53,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(prog="python -m benchmarks.recorded", description=__doc__)
     parser.add_argument("--recordings", type=Path, default=BESIDE, help="holds real/ and practice/")
-    folder: Path = parser.parse_args(arguments).recordings
+    parser.add_argument("--laws", action="store_true", help="what laws gain on the real motors")
+    parser.add_argument("--only", default="", help="with --laws: of one motor, by the name of its folder")
+    given = parser.parse_args(arguments)
+    folder: Path = given.recordings
     if not folder.is_dir():
         print(
             f"--recordings: found no folder {folder}, expected one with real/ and practice/", file=sys.stderr
         )
         return 2
-    print(HEAD + "|---" * 8 + "|")
-    for row in rows(folder):
+    print((LAWS_HEAD if given.laws else HEAD) + "|---" * 8 + "|")
+    for row in law_rows(folder, given.only) if given.laws else rows(folder):
         print(row, flush=True)
     return 0
 
@@ -64,6 +78,17 @@ def rows(folder: Path) -> Iterator[str]:
     for name, answer in answers.items():
         case = read_case(folder / "practice" / name)
         yield _row(name, _concealed(answer), discover(case, [r.name for r in case.recordings[-2:]]))
+
+
+def law_rows(folder: Path, only: str = "") -> Iterator[str]:
+    """Return the rows of the table of laws: of each real motor, or of one, the catalogue, both, and laws alone."""
+    for name, held in REAL:
+        if only in ("", name):
+            case = read_case(folder / "real" / name)
+            for words, catalogue, invents in ARMS:
+                language = physics_grammar() if invents else None
+                verdict = discover(case, held, catalogue=catalogue, language=language, invents=invents)
+                yield _law_row(name, words, verdict)
 
 
 def windows_mm(verdict: Verdict) -> str:
@@ -81,6 +106,15 @@ def _concealed(answer: dict[str, Any]) -> str:
     numbers = [f"{key} {value}" for key, value in answer.items() if key not in ("effects", "outside")]
     words = [", ".join(f"`{effect}`" for effect in answer["effects"]), answer.get("outside", ""), *numbers]
     return "; ".join(filter(None, words)) or "nothing"
+
+
+def _law_row(name: str, words: str, verdict: Verdict) -> str:
+    judged = verdict.judgement
+    held = "its last 30 %" if judged.by_time else ", ".join(judged.recordings)
+    found = "; ".join(f"`{found.id}`" for found in verdict.effects) or "-"
+    laws = "; ".join(f"`{law.term.typeset}`" for law in verdict.invented).replace("|", "\\|") or "-"
+    sizes = " | ".join(f"{size:.4f}" for size in (judged.before, judged.after, judged.floor))
+    return f"| {name} | {held} | {words} | {found} | {laws} | {sizes} |"
 
 
 def _row(name: str, concealed: str, verdict: Verdict) -> str:
