@@ -69,6 +69,8 @@ from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import Outcome, World, simulate
 from gecar.world.terms import Term
 
+Spans = Mapping[str, Mapping[str, Interval]]
+
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 INSTEAD = 0.7  # of what effects and laws beside them leave: laws in their place must leave less
 
@@ -266,7 +268,7 @@ class _Stage(Confirmation):
         Encoders or poses, where nothing explains those, so that they were left out.
     """
 
-    spans: Mapping[str, Mapping[str, Interval]]
+    spans: Spans
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
     left_out: str = ""
@@ -369,15 +371,6 @@ def _with_laws_on(
     return replace(stage, spans=_spans(context, written.explained)) if written.terms else stage
 
 
-def _spans(context: _Context, explained: Explanation) -> Mapping[str, Mapping[str, Interval]]:
-    """Return the 95 % intervals of effects that were fitted anew beside laws."""
-    if not explained.steps:
-        return {}
-    spans = intervals(explained.problem.estimator, explained.taken, context.seed)
-    on_bench = explained.problem.on_bench
-    return along_valleys(explained.problem, explained.taken, spans) if on_bench else spans
-
-
 def _left(stage: _Stage) -> float:
     """Return the size of what a stage leaves unexplained, as a multiple of the smallest material size."""
     return stage.explained.problem.material.times(stage.explained.left)
@@ -405,14 +398,22 @@ def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
         absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
         if not absent:
-            if explained.minor:
-                small = intervals(explained.problem.estimator, explained.whole, context.seed)
-                spans = {**small, **spans}
-            if explained.steps and explained.problem.on_bench:
-                spans = along_valleys(explained.problem, explained.taken, spans)
-            return _Stage(explained, candidates, confirmation.unseen, spans)
+            break
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
+    return _Stage(explained, candidates, confirmation.unseen, _spans(context, explained, spans))
+
+
+def _spans(context: _Context, explained: Explanation, named: Spans | None = None) -> Spans:
+    """Return the intervals of an explanation's effects, small ones too; on a bench along the valleys they lie in.
+
+    ``named`` are those of its named effects, if they are known without valleys.
+    """
+    problem, taken = explained.problem, explained.taken
+    spans = named if named is not None else intervals(problem.estimator, taken, context.seed)
+    if explained.minor:
+        spans = {**intervals(problem.estimator, explained.whole, context.seed), **spans}
+    return along_valleys(problem, taken, spans) if explained.steps and problem.on_bench else spans
 
 
 def _findings(context: _Context, stages: Sequence[_Stage]) -> tuple[tuple[Found, ...], tuple[Robot, ...]]:
