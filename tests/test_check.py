@@ -108,3 +108,9 @@ def test_the_shipped_table_reads_back_as_it_was_written(tmp_path):
 def test_a_table_that_is_wrong_is_one_line(gecar, tmp_path, text, named):
     (tmp_path / "wrong.toml").write_text(text)
     assert named in gecar.error("check", "wrong.toml", "--workers", 1)
+
+
+def test_the_guarded_table_holds(gecar):
+    ended = gecar("check", SHIPPED, "--json")
+    assert ended.json["moved"] == []
+    assert ended.code == 0
