@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.sizes import is_material
+from benchmarks.concealed.sizes import is_material, sizes_in
 from gecar.files import json_ready, write_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.sentences import physics_grammar
@@ -125,7 +125,7 @@ def look_at(folder: Path, label: dict[str, Any], out: Path, seed: int = 0) -> di
 
 def asks_for_a_law(label: dict[str, Any]) -> bool:
     """Whether what a case conceals is material; one that conceals nothing asks that none is written, and counts."""
-    sizes = [size for name, size in label.get("size", {}).items() if name != "background"]
+    sizes = [size for name, size in sizes_in(label).items() if name != "background"]
     return not sizes or any(map(is_material, sizes))
 
 

@@ -18,10 +18,12 @@ from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.history import replayed
 from benchmarks.concealed.judging import judge
 from benchmarks.concealed.plan import Counts, outside_kinds, plan
+from benchmarks.concealed.recording import CHANNELS
 from benchmarks.concealed.rehearsal import tuned
 from benchmarks.concealed.robot import LARGE, NEUTRAL, Concealed
 from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import Setting
+from benchmarks.concealed.sizes import is_material, size
 from benchmarks.concealed.worlds import WORLDS, truth
 from gecar.world.robot import read_robot
 
@@ -235,6 +237,7 @@ def test_label_says_world_setting_and_sizes_and_the_background_is_small(drawn):
     assert set(label["d_prime"]) == {"viscous_friction", "carpet_pile"}
     assert set(label["size"]) == {"viscous_friction", "carpet_pile", "background"}
     assert label["size"]["background"]["mm_drive"] < 7.0
+    assert label["size_repeatedly"]["background"]["mm_drive"] <= label["size"]["background"]["mm_drive"]
     assert label["size"]["background"]["deg_drive"] < 1.5
 
 
@@ -280,3 +283,16 @@ def test_outside_physics_that_gets_a_law_is_no_wrong_name():
         named = [{"id": "p"}] if word == "missing" else []
         assert judge(label, {"verdict": word, "effects": named}, seen).right == right
     assert judge(label, {"verdict": "nothing", "effects": []}, seen).all_material
+
+
+def test_what_one_of_eight_recordings_shows_is_not_material_repeatedly():
+    way = np.linspace(0.0, 2.0, 201)
+    straight = np.zeros((201, len(CHANNELS)))
+    straight[:, CHANNELS.index("x_m")] = way
+    aside = straight.copy()
+    aside[:, CHANNELS.index("y_m")] = 0.03 * way
+    once, twice = ([(aside, straight)] * k + [(straight, straight)] * (8 - k) for k in (1, 2))
+    assert size(once)["mm_1m"] == pytest.approx(30.0)
+    assert not is_material(size(once, repeatedly=True))
+    assert is_material(size(twice, repeatedly=True))
+    assert is_material(size(once[:1], repeatedly=True))

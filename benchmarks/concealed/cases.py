@@ -464,14 +464,15 @@ def _measured(hidden: Hidden, case: Case, worlds: Mapping[str, Array]) -> dict[s
     ids = [effect["id"] for effect in hidden.label["effects"]]
     ids += [hidden.label["outside"]["id"]] if hidden.label["outside"] else []
     absent = {name: f"without_{name}" if len(ids) > 1 else "off" for name in ids}
-    sizes = {name: size(pairs("on", other)) for name, other in absent.items()}
+    compared = {name: pairs("on", other) for name, other in absent.items()}
     if hidden.plain is not None:
-        sizes["background"] = size(pairs("off", "plain"))
+        compared["background"] = pairs("off", "plain")
+    sizes, repeated = ({name: size(of, often) for name, of in compared.items()} for often in (False, True))
     loud = {
         name: round(visibility(worlds, "on", other, case.conditions).d_prime, 3)
         for name, other in absent.items()
     }
-    return {"d_prime": loud, "size": sizes}
+    return {"d_prime": loud, "size": sizes, "size_repeatedly": repeated}
 
 
 def _task(kind: str, rng: Rng, base: Base, pace: float = 1.0) -> tuple[Pose, Controller]:

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.concealed.effects import SEVERAL, is_below
 from benchmarks.concealed.history import Array
 from benchmarks.concealed.recording import CHANNELS, POSE
-from benchmarks.concealed.sizes import is_material
+from benchmarks.concealed.sizes import is_material, sizes_in
 
 LARGEST_SET = 4  # an `or` of more names than this names nothing
 BIN_S = 0.2  # places in time are compared in steps of so long
@@ -136,7 +136,7 @@ def judge(label: Mapping[str, Any], verdict: Mapping[str, Any], seen: Mapping[st
         regime_overlap=overlap,
         world=label.get("world", "mujoco"),
         setting=label.get("setting", {}),
-        sizes=label.get("size", {}),
+        sizes=sizes_in(label),
         camera=not set(POSE).isdisjoint(label.get("conditions", {}).get("columns", POSE)),
         invisible=_invisible(label["effects"], verdict.get("limits") or {}),
     )
