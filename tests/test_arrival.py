@@ -137,7 +137,7 @@ def test_a_studys_pictures_show_shares_within_their_edges(shares):
 
 def test_an_older_run_is_drawn_with_a_dash(gecar, old, runs):
     ended = gecar("plot", old, "--html", "--json")
-    assert len(ended.json["pictures"]) == 5
+    assert len(ended.json["pictures"]) == 6
     assert "- % arrive" in (old / "drive.html").read_text()
     beside = gecar("plot", old, runs / "better")
     assert "- %" in beside.out

@@ -113,7 +113,8 @@ def test_a_finished_run_resumed_says_the_same(gecar, run):
 def test_plot_draws_a_run_again(gecar, run, tmp_path):
     (run / "trajectory.png").unlink()
     assert gecar("plot", run, "--json").json["pictures"] == [
-        str(run / f"{name}.png") for name in ("convergence", "trajectory", "population", "tree", "genealogy")
+        str(run / f"{name}.png")
+        for name in ("convergence", "trajectory", "locality", "population", "tree", "genealogy")
     ]
     assert (run / "trajectory.png").exists()
 
