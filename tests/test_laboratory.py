@@ -43,7 +43,8 @@ def test_the_page_s_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
     for code in re.findall(r"(?s)```python\n(.*?)```", page):
         exec(code, names)  # a page of this repository
     said = capsys.readouterr().out
-    square, keijzer, vladislavleva, ant, robot, front, two_aims, representations = said.splitlines()
+    lines = said.splitlines()
+    square, keijzer, vladislavleva, ant, robot, front, two_aims, representations, locality = lines
     assert float(square.split()[-2]) < 1e-12
     assert float(keijzer.split()[1]) < 0.2
     assert float(vladislavleva.split()[1]) < 0.25
@@ -54,6 +55,10 @@ def test_the_page_s_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert list(sizes) == sorted(sizes, reverse=True)
     assert float(two_aims.strip("[]").split()[1]) >= 1
     assert all(float(word) < 89 for word in representations.split())
+    neutral, frequent, times = locality.split()
+    assert 0.0 < float(neutral) < 1.0
+    assert frequent.endswith(";")
+    assert int(times) > 1
 
 
 def test_a_maximised_fitness_ends_the_run_at_its_target() -> None:
