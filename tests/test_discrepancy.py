@@ -17,11 +17,13 @@ from gecar.reality.fitting.initial_values import patches
 from gecar.reality.materiality import Material, Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.recordings.recording import Case, Recording, write_recording
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.parting import Sizes
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.problem import worth_a_name
+from gecar.reality.selection import problem as selection_problem
+from gecar.reality.selection.problem import problem_of, worth_a_name
 from gecar.reality.selection.stepwise import explain, left_share
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
@@ -227,3 +229,22 @@ def test_what_is_bent_at_neutral_is_no_small_change(nothing) -> None:
     assert bent == {"right_minus_left_pct", "forward_minus_backward_pct"}
     assert nothing.residual.white
     assert nothing.residual.size.mm_1m < 1.0
+
+
+def test_small_changes_that_are_not_in_proportion_are_fitted_by_replay(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A little play, and a little less grip: linear small changes leave more than those fitted."""
+    worn = {"backlash": {"angle_deg": 0.7}, "tyre_friction": {"coefficient": 0.82}}
+    runs = [recorded(EV3.with_effects(worn), seed) for seed in range(4)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    problem = problem_of(residuals, EV3, ("backlash", "tyre_friction", "track_width", "wheel_radius"))
+    problem = problem.under(problem.known)
+
+    def left() -> float:
+        return cost(residuals.errors(replace(problem).with_small_changes(problem.known)))
+
+    fitted = left()
+    monkeypatch.setattr(selection_problem, "REFINEMENTS", 0)
+    assert fitted < left() - 1.0
+    assert fitted < cost(residuals.errors(EV3.physics))
