@@ -16,7 +16,24 @@ from gecar.evolution.scores import UNSOLVED
 PLAIN_EVERY_S = 5.0
 
 
-class Watch:
+class _LiveLine:
+    """A line on a terminal that is shown inside a ``with`` block; ``live`` is None elsewhere."""
+
+    live: Progress | None
+
+    def __enter__(self) -> Self:
+        if self.live:
+            self.live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.live:
+            self.live.stop()
+
+
+class Watch(_LiveLine):
     """Shows a run's generations on stderr as they come.
 
     Parameters
@@ -40,17 +57,6 @@ class Watch:
             self.live = Progress(*columns, console=console, transient=True)
             self.task = self.live.add_task("starting ...", total=generations + 1)
 
-    def __enter__(self) -> Self:
-        if self.live:
-            self.live.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.live:
-            self.live.stop()
-
     def __call__(self, generation: Generation) -> None:
         """Show a generation that has just been scored."""
         if self.live:
@@ -61,7 +67,7 @@ class Watch:
             self.console.print(line(self.history, self.generations), soft_wrap=True)
 
 
-class Steps:
+class Steps(_LiveLine):
     """Shows what a long command does: on a terminal in one line, with the time since it began.
 
     Parameters
@@ -84,17 +90,6 @@ class Steps:
             )
             self.live = Progress(*columns, console=console, transient=True)
             self.task = self.live.add_task("starting ...", total=None)
-
-    def __enter__(self) -> Self:
-        if self.live:
-            self.live.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.live:
-            self.live.stop()
 
     def __call__(self, step: str) -> None:
         """Show a step that begins or has ended."""
