@@ -126,6 +126,11 @@ class FitnessProblem(Problem[P]):
         """Return the text as bytes."""
         return derivation.text.encode()
 
+    def seed(self, program: P, digest: bytes, seed: int) -> int:
+        """Return the seed of a program's noise; 0 where the function has no part for chance."""
+        chance = self.fitness.function is None or self.rescored
+        return super().seed(program, digest, seed) if chance else 0
+
     def solved(self, score: np.void) -> bool:
         """Whether a program reaches the target, in all its draws."""
         fitness = self.fitness

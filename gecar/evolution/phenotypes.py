@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, NamedTuple
 
 import numpy.typing as npt
 
@@ -14,8 +13,7 @@ from gecar.language.mapping import Derivation, Mapped, Mapper
 DIGEST_BYTES = 16
 
 
-@dataclass(frozen=True)
-class Phenotype(Generic[P]):
+class Phenotype(NamedTuple, Generic[P]):
     """A program, the codons that derive it (as few and as small as do), and a hash of what it does."""
 
     program: P
@@ -54,14 +52,14 @@ class Phenotypes(Generic[P]):
     def _phenotype(self, mapped: Mapped, i: int) -> Phenotype[P] | None:
         key = mapped.key(i)
         if key not in self._now:
-            self._now[key] = self._before[key] if key in self._before else self._read(mapped, i)
+            self._now[key] = self._before[key] if key in self._before else self._read(mapped, i, key)
         return self._now[key]
 
-    def _read(self, mapped: Mapped, i: int) -> Phenotype[P] | None:
+    def _read(self, mapped: Mapped, i: int, key: bytes) -> Phenotype[P] | None:
         derivation = Derivation(mapped, i)
         program = self.problem.read(derivation)
         if program is None:
             return None
         meaning = self.problem.meaning(program, derivation)
         digest = hashlib.blake2b(meaning, digest_size=DIGEST_BYTES).digest()
-        return Phenotype(program, mapped.key(i), digest)
+        return Phenotype(program, key, digest)

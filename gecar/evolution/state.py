@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,7 @@ Bytes = npt.NDArray[np.uint8]
 Genomes = npt.NDArray[np.integer[Any]]
 
 
-@dataclass(frozen=True)
-class Candidate(Generic[P]):
+class Candidate(NamedTuple, Generic[P]):
     """A program to be scored, the seed of its noise, the best merit so far, the generation."""
 
     program: P
