@@ -183,6 +183,17 @@ def test_an_imitation_of_another_size_in_every_recording_is_not_named() -> None:
     assert explained.unexplained
 
 
+def test_a_strong_cause_is_named_though_its_size_seems_to_differ_by_a_tenth() -> None:
+    near = np.repeat([0.1, -0.15, 0.0, 0.05], 600) * 3.0 * RESPONSES[VISCOUS]  # what nobody listed does that
+    cause = linear({VISCOUS: 3.0}, RESPONSES)
+    cause = replace(cause, noise=cause.noise + near)
+    explained = explain(linear_problem(cause))
+    (step,) = explained.steps
+    assert step.effect == VISCOUS
+    assert (step.left_out > 100.0).all()  # its own small change does not hide what recordings have in common
+    assert not explained.drifting
+
+
 def test_a_twentieth_of_a_loud_case_is_not_left_without_a_word() -> None:
     loud = linear({VISCOUS: 8.0}, RESPONSES)
     loud = replace(loud, noise=loud.noise + unlike(RESPONSES[VISCOUS], 9, 1.8))

@@ -32,7 +32,7 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CLOSE, MEASURED, PRICE, UNSTEADY
+from gecar.reality.selection.thresholds import CLOSE, DRIFTING, MEASURED, PRICE
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
 from gecar.world.ports import N_TERMS, PORTS, TOWARD_A_POINT
@@ -169,7 +169,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _spread(library, law) < UNSTEADY:
+        if law.worth >= PRICE and proof.holds and _spread(library, law) < DRIFTING:
             yield law, proof
         if len(tried) == TRIED:
             return

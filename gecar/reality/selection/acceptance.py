@@ -169,5 +169,6 @@ def size_of(problem: Problem, model: Model, step: Step) -> Size:
 
 
 def steady(problem: Problem, step: Step) -> bool:
-    """Whether an effect has one size in all recordings: imitations have not."""
-    return spread_of_size(problem.estimator.blocks.folds, step.base.errors, step.model.errors) < STEADY
+    """Whether an effect has one size in all recordings: imitations have not; the problem is under what is left."""
+    without, with_effect = (problem.estimator.at(each, each.z).errors for each in (step.base, step.model))
+    return spread_of_size(problem.estimator.blocks.folds, without, with_effect) < STEADY

@@ -20,7 +20,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import shares_of_groups
-from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE, STEADY
+from gecar.reality.selection.thresholds import DRIFTING, NEGLIGIBLE, SIGNIFICANCE
 
 Array = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.intp]
@@ -48,14 +48,22 @@ class Heterogeneity(NamedTuple):
 def drifts(problem: Problem, model: Model, step: Step) -> bool:
     """Whether the size of one of a model's effects differs between recordings, times or regimes: surely, and by much.
 
-    It must differ where small changes of all constants are unknown, as noise; and not by a negligible part beside the
-    most likely ones, for as noise they may hide all of an effect but an odd little.
+    It must differ where small changes of all other constants are unknown, as noise; and not by a negligible part beside
+    the most likely ones, for as noise they may hide all of an effect but an odd little.
+
+    Parameters
+    ----------
+    problem
+        Under what the model leaves, so that no small change of the effect itself is noise.
+    model, step
+        The model, and the step that took the effect.
     """
+    unknown = tuple(problem.estimator.at(each, each.z).errors for each in (step.base, step.model))
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni
     return any(
-        _differs(heterogeneity(groups, step.base.errors, step.model.errors), STEADY, chance)
+        _differs(heterogeneity(groups, *unknown), DRIFTING, chance)
         and _differs(heterogeneity(groups, *known), NEGLIGIBLE, chance)
         for groups in splits
     )
