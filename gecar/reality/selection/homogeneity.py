@@ -62,10 +62,9 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni
-    return any(
-        _differs(heterogeneity(groups, *unknown), DRIFTING, chance)
-        and _differs(heterogeneity(groups, *known), NEGLIGIBLE, chance)
-        for groups in splits
+    return all(
+        any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
+        for errors, least in ((unknown, DRIFTING), (known, NEGLIGIBLE))
     )
 
 
