@@ -2,9 +2,13 @@ import numpy as np
 import pytest
 
 from gecar.errors import InputError
+from gecar.reality.advise.notes import battery_at_its_end
+from gecar.reality.calibrate.constants import FreeConstants, chosen
 from gecar.reality.fitting.parameters import free
+from gecar.reality.verdict import Interval
+from gecar.report.units import quantities
 from gecar.world.effects import BY_ID, CATALOGUE, PHYSICS
-from gecar.world.robot import load_robot, read_robot, write_robot
+from gecar.world.robot import Battery, list_robots, load_robot, read_robot, write_robot
 
 EV3 = load_robot("ev3")
 
@@ -110,3 +114,41 @@ def test_every_parameter_is_a_field_once():
     for effect in CATALOGUE:
         for parameter in effect.parameters:
             assert parameter.low <= EV3.nominal(parameter) <= parameter.high
+
+
+def with_battery(**fields):
+    return EV3.model_copy(update={"battery": Battery(**(EV3.battery.model_dump() | fields))})
+
+
+@pytest.mark.parametrize("name", list_robots())
+def test_no_fit_leaves_the_voltages_a_robots_battery_can_have(name):
+    robot = load_robot(name)
+    (scale,) = free(robot, ["supply_voltage"]).coordinates
+    volts = [scale.value(z) * robot.battery.voltage for z in (-1e3, 1e3)]
+    assert volts == pytest.approx([robot.battery.voltage_low, robot.battery.voltage_high])
+    low, high = FreeConstants(robot, chosen(["battery.voltage"])).bounds
+    assert robot.battery.voltage + 0.05 * np.r_[low, high] == pytest.approx(volts)
+
+
+def test_a_battery_that_does_not_say_keeps_the_catalogues_bounds():
+    unsaid = with_battery(voltage_low=None, voltage_high=None)
+    (scale,) = free(unsaid, ["supply_voltage"]).coordinates
+    assert (scale.value(-1e3), scale.value(1e3)) == pytest.approx((0.5, 1.3))
+
+
+@pytest.mark.parametrize("fields", ["voltage_low = 9.0", "voltage_high = 8.0", "voltage_low = -1.0"])
+def test_a_battery_that_cannot_have_its_voltage_is_refused(tmp_path, fields):
+    path = tmp_path / "robot.toml"
+    path.write_text(MOTOR_ALONE.replace("voltage = 10.0", f"voltage = 8.67\n{fields}"))
+    with pytest.raises(InputError, match=r"robot.toml, battery.*found .*expected"):
+        load_robot(path)
+
+
+def test_a_voltage_at_the_batterys_end_is_open_and_said():
+    top = EV3.bounds(BY_ID["supply_voltage"].parameters[0])[1]
+    (battery,) = quantities("supply_voltage", {"scale": Interval(top, 1.15, top, "-")}, EV3)
+    assert str(battery) == "battery 8.67 → 10.50 V (9.97 or more)"
+    (note,) = battery_at_its_end(EV3.with_effects({"supply_voltage": {"scale": top}}))
+    assert "10.5 V" in note
+    assert not battery_at_its_end(EV3.with_effects({"supply_voltage": {"scale": 1.1}}))
+    assert not battery_at_its_end(EV3)

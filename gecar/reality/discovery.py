@@ -231,6 +231,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             motion.left_out,
             [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen],
             context.split,
+            found,
         ),
         evidence=Evidence(
             motion.explained,

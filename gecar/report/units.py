@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from gecar.compiled import numbers
+from gecar.reality.fitting.parameters import bounded
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID, DEG, Parameter
 from gecar.world.robot import Robot
@@ -153,10 +154,10 @@ def quantities(effect_id: str, parameters: Mapping[str, Interval], robot: Robot)
     for parameter in BY_ID[effect_id].parameters:
         if parameter.field in _SHAPES or parameter.label not in parameters:
             continue
-        found = parameters[parameter.label]
+        found, ends_at = parameters[parameter.label], bounded(robot, parameter)
         reading = _scaled(_READINGS[parameter.field], found.value * parameter.si, constants)
         now = reading.of(found.value * parameter.si, constants)
-        ends = ((found.low, parameter.low), (found.high, parameter.high))
+        ends = ((found.low, ends_at.low), (found.high, ends_at.high))
         (low, or_less), (high, or_more) = sorted(
             (reading.of(end * parameter.si, constants), _only_searched(end, bound, parameter))
             for end, bound in ends

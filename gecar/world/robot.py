@@ -66,10 +66,25 @@ class Motor(_Section):
 
 
 class Battery(_Section):
-    """Voltage source [V] behind a resistance [ohm]."""
+    """Voltage source [V] behind a resistance [ohm]; the voltages it can have [V], empty and full, where known."""
 
     voltage: Positive
     resistance: NotNegative = 0.0
+    voltage_low: Positive | None = None
+    voltage_high: Positive | None = None
+
+    @model_validator(mode="after")
+    def _can_be(self) -> Battery:
+        low, high = self.range(0.0, math.inf)
+        if not low <= self.voltage <= high:
+            raise ValueError(
+                f"found voltage = {self.voltage:g}, expected voltage_low to voltage_high, {low:g} to {high:g} V"
+            )
+        return self
+
+    def range(self, low: float, high: float) -> tuple[float, float]:
+        """Return the lowest and highest voltage it can have [V]; those given where it does not say."""
+        return self.voltage_low or low, self.voltage_high or high
 
 
 class Drive(_Section):
@@ -167,6 +182,11 @@ class Robot(_Section):
         if parameter.field == "com_ahead":  # between the axle and the caster, or the robot falls over
             short_of_caster = self.body.caster_ahead - math.copysign(0.001, self.body.caster_ahead)
             return min(round(short_of_caster, 6), 0.0), max(round(short_of_caster, 6), 0.0)
+        if parameter.field == "supply_scale":
+            low, high = self.battery.range(
+                parameter.low * self.battery.voltage, parameter.high * self.battery.voltage
+            )
+            return low / self.battery.voltage, high / self.battery.voltage
         if parameter.unit.startswith("N m"):  # bounds are an EV3's; a larger drive has larger ones
             return -math.inf if parameter.low < 0.0 else parameter.low, math.inf
         return parameter.low, parameter.high
@@ -280,7 +300,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that `read_robot` reads back to an equal robot."""
-    table = robot.model_dump(exclude={"term"})
+    table = robot.model_dump(exclude={"term"}, exclude_none=True)
     if not table["effects"]:
         del table["effects"]
     terms = [f"\n[[term]]\n{tomli_w.dumps(term.as_table())}" for term in robot.term]

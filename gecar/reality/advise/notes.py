@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ from gecar.reality.recordings.split import Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
+from gecar.world.robot import Robot
 
 NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
 DRIFTS = "its size differs between recordings, times or kinds of motion: it imitates something else"
@@ -32,6 +34,7 @@ def notes_on(
     left_out: str = "",
     unseen: Sequence[str] = (),
     as_logged: Split | None = None,
+    found: Robot | None = None,
 ) -> tuple[str, ...]:
     """Return notes, a sentence or two each.
 
@@ -56,6 +59,8 @@ def notes_on(
         Effects found that the recordings set aside do not show.
     as_logged
         The same recordings with the faults of their logs.
+    found
+        The robot with the effects found.
     """
     notes = [
         f"{step.effect} explains the fitted recordings, but {DRIFTS if step.drifts else NOT_CONFIRMED}: a candidate, "
@@ -68,6 +73,7 @@ def notes_on(
         for effect in unseen
     ]
     notes += _log_faults(split, as_logged or split)
+    notes += battery_at_its_end(found) if found else []
     if left_out:
         notes.append(LEFT_OUT[left_out])
     notes += [
@@ -103,6 +109,19 @@ def _start(run: RecordingResiduals) -> str:
     x, y, heading = run.nuisances.start
     degrees = np.degrees(heading) % 360.0
     return f"{run.recording.name} began at x {x:.3f} m, y {y:.3f} m, heading {degrees:.0f} degrees"
+
+
+def battery_at_its_end(robot: Robot) -> list[str]:
+    """Return a note where the battery's voltage is as low or high as the robot's file allows, if it says."""
+    battery = robot.battery
+    voltage = battery.voltage * robot.effects.get("supply_voltage", {}).get("scale", 1.0)
+    ends = {"voltage_low": battery.voltage_low, "voltage_high": battery.voltage_high}
+    return [
+        f"The battery's voltage was fitted as {end:g} V, the end of what the robot's file allows (battery.{field}). "
+        "Either the robot has another battery, or something else acts like its voltage."
+        for field, end in ends.items()
+        if "supply_voltage" in robot.effects and end is not None and math.isclose(voltage, end, rel_tol=1e-6)
+    ]
 
 
 def _log_faults(split: Split, as_logged: Split) -> list[str]:

@@ -141,9 +141,13 @@ class FreeConstants:
         return (low - self.standing) / self.steps, (high - self.standing) / self.steps
 
     def _ends(self, constant: Constant) -> tuple[float, float]:
-        """Return the lowest and highest value of a constant; the centre of mass stays between axle and caster."""
+        """Return the lowest and highest value of a constant in this robot."""
         if constant.kernel == "com_ahead":
             return self.robot.bounds(BY_ID["com_offset"].parameters[0])
+        if constant.name == "battery.voltage":
+            low, high = self.robot.battery.range(constant.low, constant.high)
+            scale = float(self.robot.physics["supply_scale"][0])
+            return max(low, low / scale), min(high, high / scale)
         return constant.low, constant.high
 
     def values(self, z: Array) -> Array:

@@ -153,7 +153,7 @@ def free(robot: Robot, effect_ids: Sequence[str]) -> Parameters:
         robot,
         tuple(
             Coordinate(
-                BY_ID[i], _bounded(robot, p), _known_value(robot, BY_ID[i], p), torque_scale(robot, p.unit)
+                BY_ID[i], bounded(robot, p), _known_value(robot, BY_ID[i], p), torque_scale(robot, p.unit)
             )
             for i in effect_ids
             for p in BY_ID[i].parameters
@@ -161,8 +161,8 @@ def free(robot: Robot, effect_ids: Sequence[str]) -> Parameters:
     )
 
 
-def _bounded(robot: Robot, parameter: Parameter) -> Parameter:
-    """Return a parameter with the bounds this robot's body sets."""
+def bounded(robot: Robot, parameter: Parameter) -> Parameter:
+    """Return a parameter with the bounds this robot sets: its body, its battery."""
     low, high = robot.bounds(parameter)
     return parameter if math.isinf(high) else replace(parameter, low=low, high=high)
 
