@@ -1,6 +1,7 @@
 """The genealogy of a run's best program, and the film of how it got better."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from command import call
 from PIL import Image
 from searching import MAPPER, SMALL, generations, new_evolution
 
+from gecar.cli.actions import run_pictures
 from gecar.errors import InputError
 from gecar.evolution.lineage import Lineage
 from gecar.plots.drives.animation import BETWEEN_S, LAST_FRAME_S
@@ -140,6 +142,20 @@ def test_plot_draws_only_what_is_named(gecar, finished, tmp_path):
 )
 def test_what_can_not_be_drawn_is_one_line(gecar, words, named):
     assert named in gecar.error("plot", *words)
+
+
+@pytest.mark.parametrize("chosen", [0, 2, 4])
+def test_a_film_of_an_evolution_ends_with_the_program_the_run_chose(chosen, finished, monkeypatch):
+    filmed = []
+    monkeypatch.setattr(run_pictures, "film_evolution", lambda world, champions, *_: filmed.extend(champions))
+    ancestry = read_ancestry(finished)
+    arrives = next(k for k in range(20) if ancestry.program((chosen, k)) is not None)
+    told = replace(ancestry, winner=(chosen, arrives))
+    monkeypatch.setattr(run_pictures, "read_ancestry", lambda folder: told)
+    run_pictures.film_run(finished, finished / "e.gif")
+    assert (filmed[-1].generation, filmed[-1].program) == (chosen, told.program(told.winner))
+    assert [each.generation for each in filmed] == sorted({each.generation for each in filmed})
+    assert filmed[-1].title.startswith(f"Generation {chosen} · ")
 
 
 @pytest.mark.parametrize("count", [1, 2, 8, 65])

@@ -216,7 +216,7 @@ def _shares_in(task: Task, ancestry: Ancestry) -> Callable[[Member], float | Non
 
 
 def film_run(folder: Path, target: Path) -> Path:
-    """Film programs that were the best of a run so far, the first and the last among them, in half a minute at most.
+    """Film how a run came to its best program, in half a minute at most: from the first best so far to the one chosen.
 
     Raises
     ------
@@ -232,8 +232,10 @@ def film_run(folder: Path, target: Path) -> Path:
 
 
 def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
-    """Drive the programs that a film shows, each the best so far, as the run scored it."""
-    members = [(member[0], ancestry.program(member)) for member in ancestry.lineage.champions()]
+    """Drive the programs that a film shows as the run scored them: each the best so far, and at the end the run's."""
+    winner = ancestry.winner  # later ones looked faster, and arrive less often
+    ways = [member for member in ancestry.lineage.champions() if member[0] < winner[0]]
+    members = [(member[0], ancestry.program(member)) for member in (*ways, winner)]
     found = choose_shown([(generation, program) for generation, program in members if program is not None])
     arriving = shares(world, [program for _, program in found], settings["seed"])
     champions = []

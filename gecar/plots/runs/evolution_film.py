@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from gecar.language.program import Program
 from gecar.plots.drives.animation import BETWEEN_S, LAST_FRAME_S, Scene, film_of
 from gecar.plots.runs.convergence import UNSOLVED
-from gecar.plots.style import BLUE, FAINT
+from gecar.plots.style import FAINT, INK
 from gecar.world.rollout import Drive, World
 
 PACE, FASTEST = 12.0, 100.0
@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Champion:
-    """The best program so far.
+    """The best program so far, or the one a run chose.
 
     Attributes
     ----------
@@ -98,11 +98,11 @@ class EvolutionScene(Scene):
         times = np.where(best < UNSOLVED, best, np.nan)
         now = self.champion.generation
         self.below.step(generation, times, where="post", color=FAINT)
-        self.below.step(generation[: now + 1], times[: now + 1], where="post", color=BLUE, linewidth=2.0)
-        self.below.plot(generation[now], times[now], "o", color=BLUE, markersize=5)
+        self.below.step(generation[: now + 1], times[: now + 1], where="post", color=INK, linewidth=2.0)
+        self.below.plot(generation[now], times[now], "o", color=INK, markersize=5)
         self.below.set(xlabel="generation", ylabel="best [s]", xlim=(0.0, max(generation[-1], 1.0)))
         self.below.xaxis.set_major_locator(MaxNLocator(integer=True, steps=(1, 2, 5, 10)))
-        self.cursor = self.below.axvline(now, color=BLUE, linewidth=1.0, linestyle=":")
+        self.cursor = self.below.axvline(now, color=INK, linewidth=1.0, linestyle=":")
 
     def _mark(self, sample: int) -> None:
         """Leave the generation marked."""
