@@ -12,10 +12,12 @@ from command import call
 from courses import course_text
 from gecar.cli.actions.run_pictures import _champions
 from gecar.cli.inputs import build_world, find_program
+from gecar.language.program import parse_program
 from gecar.plots.runs.compare_runs import compare_runs
 from gecar.plots.runs.convergence import Reference, convergence
 from gecar.plots.runs.study_table import convergences, heat_map
 from gecar.plots.style import is_whole, settle
+from gecar.reality.calibrate.constants import with_constants
 from gecar.report.drive import title_of
 from gecar.report.runs import run_title
 from gecar.report.table import csv_text, markdown, runs_csv
@@ -26,8 +28,10 @@ from gecar.results.cells import cells_of
 from gecar.results.config import Config
 from gecar.results.folder import read_result
 from gecar.results.study import Axis, Study
+from gecar.search.chance import REPORT, REPORTED_DRAWS, arrivals
 from gecar.world.course.course import load_course
-from gecar.world.rollout import Drive, Outcome
+from gecar.world.robot import load_robot
+from gecar.world.rollout import Drive, Outcome, World
 
 TINY = ("--population", 20, "--generations", 2, "--workers", 1, "--quiet", "--no-pictures")
 
@@ -148,6 +152,33 @@ def test_pages_and_titles_of_a_run_say_its_share(gecar, runs, tmp_path):
     assert gecar("plot", runs / "paper", "--html", "--out", tmp_path).code == 0
     share = share_of(read_result(runs / "paper"))
     assert f" s, {percent(share)} arrive" in (tmp_path / "drive.html").read_text()
+
+
+# What the tutorial's `gecar evolve --seed 1` finds; its rehearsal calibrates the robot to these constants.
+TUTORIAL = """
+if(SensorValue > 80):
+    motor(70,90,10)
+else:
+    motor(40,-80,10)
+if(SensorValue > 80):
+    motor(60,90,10)
+else:
+    motor(40,-80,0)
+if(SensorValue > 75):
+    motor(80,60,10)
+else:
+    motor(-50,-80,0)
+"""
+CALIBRATED = {"battery.voltage": 8.2, "body.track_width": 0.118}
+
+
+@pytest.mark.parametrize("constants", [{}, CALIBRATED], ids=["as known", "calibrated"])
+def test_the_tutorials_program_arrives_at_least_19_times_of_20(constants):
+    world = World(with_constants(load_robot("ev3"), constants), load_course("paper"))
+    program = parse_program(TUTORIAL)
+    for seed in (2, 3, 4):  # draws that no run has seen
+        (times,) = arrivals(world, [program.opcodes], REPORTED_DRAWS, (seed, REPORT))
+        assert times.share >= 19 / 20
 
 
 def test_each_program_of_a_film_has_its_own_share(runs):
