@@ -20,7 +20,7 @@ from gecar.files import write_whole
 # Okabe and Ito, "Color Universal Design" (2008): eight colours told apart with any kind of colour vision.
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW = "#CC79A7", "#56B4E9", "#F0E442"
-INK, SOFT, FAINT, PAPER, LIGHT = "#1F2933", "#667380", "#D8DEE4", "#FFFFFF", "#FFF3C4"
+INK, SOFT, PALE, FAINT, PAPER, LIGHT = "#1F2933", "#667380", "#A0ACB8", "#D8DEE4", "#FFFFFF", "#FFF3C4"
 CYCLE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW)
 SPEED_COLOURS = "viridis"
 DPI = 150
@@ -107,8 +107,8 @@ def settle(figure: Figure) -> None:
             figure.draw_without_rendering()
 
 
-def picture_kind(path: Path) -> str:
-    """Return the kind of picture a name's ending asks for.
+def picture_kind(path: Path, option: str = "picture") -> str:
+    """Return the kind of picture a name's ending asks for; ``option`` is what an error names.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def picture_kind(path: Path) -> str:
         If it is none of PNG, PDF and SVG.
     """
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise expected("picture", f"'{path}'", "a name that ends in .png, .pdf or .svg")
+        raise expected(option, f"'{path}'", "a name that ends in .png, .pdf or .svg")
     return path.suffix.lower().removeprefix(".")
 
 

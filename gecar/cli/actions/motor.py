@@ -41,7 +41,7 @@ def draw_motor(output: Output, benches: Sequence[Path], robot_name: str, out: Pa
     InputError
         If there is no such robot, a folder is absent or holds no motor with a duty held, or a recording is wrong.
     """
-    picture_kind(out)
+    picture_kind(out, "--out")
     robot = load_robot(robot_name)
     recorded = {_name(bench): bench_speeds(bench) for bench in benches}
     regulated, powered = (simulated(altered(robot, mode)) for mode in ("speed", "duty"))

@@ -23,7 +23,12 @@ def effects(
     words: WordsArgument = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Output file of `show`.", show_default="ID.png"),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="show: name of the picture, .png, .pdf or .svg.",
+            show_default="ID.png",
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -40,6 +45,7 @@ def effects(
     """
     from rich.table import Table
 
+    from gecar.plots.style import picture_kind
     from gecar.world.effects import BY_ID, CATALOGUE
 
     output = Output(as_json)
@@ -50,6 +56,8 @@ def effects(
     effect = named[0] if named else None
     if effect is not None and effect not in BY_ID:
         raise one_of("effect", effect, BY_ID)
+    if out is not None:
+        picture_kind(out, "--out")
     if effect is not None:
         _describe(output, BY_ID[effect])
         if show:
@@ -68,8 +76,9 @@ def _draw(output: Output, effect: str, path: Path) -> None:
     from gecar.world.course.course import load_course
     from gecar.world.robot import load_robot
 
+    path.parent.mkdir(parents=True, exist_ok=True)
     save(signature_figure(effect, load_robot("ev3"), load_course("paper")), path)
-    output.print(f"Its signature: {path}.")
+    output.print(f"Picture: {path}")
 
 
 def _describe(output: Output, effect: Effect) -> None:

@@ -19,7 +19,7 @@ def motor(
     ] = None,
     robot: RobotOption = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="PICTURE", help="Output file (.png, .pdf, .svg).")
+        Path, typer.Option("--out", metavar="FILE", help="Name of the picture: .png, .pdf or .svg.")
     ] = Path("motor.png"),
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip
