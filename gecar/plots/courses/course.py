@@ -18,7 +18,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from gecar.plots.courses.robot import RobotArtist, placed, shape_of
-from gecar.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, PAPER, SOFT, headline, look, new_figure
+from gecar.plots.style import FAINT, GREEN, INK, PALE, PAPER, SOFT, headline, look, new_figure
 from gecar.world.course.course import Course, Obstacle
 from gecar.world.course.lower_bound.fastest_time import bound_words
 from gecar.world.course.tiles import Side
@@ -128,20 +128,20 @@ def _seams(course: Course) -> list[npt.NDArray[np.float64]]:
 
 def _mark_ends(axes: Axes, course: Course) -> None:
     """Tint START's and GOAL's tiles; draw an arrow where the robot starts, a chequered band where it arrives."""
-    for tile, colour in ((course.start_tile, BLUE), (course.goal, GREEN)):
+    for tile in (course.start_tile, course.goal):
         square = course.layout.square(tile)
-        axes.add_patch(outline_patch(square, facecolor=colour, alpha=0.13, edgecolor="none", zorder=_TINT))
-    arrow = PolyCollection([placed(_ARROW * 0.22 * course.tile_size_m, *course.start)], facecolors=BLUE)
-    arrow.set(edgecolor=PAPER, linewidth=0.8, zorder=_MARKS + 0.1)
+        axes.add_patch(outline_patch(square, facecolor=SOFT, alpha=0.16, edgecolor="none", zorder=_TINT))
+    arrow = PolyCollection([placed(_ARROW * 0.22 * course.tile_size_m, *course.start)], facecolors=PAPER)
+    arrow.set(edgecolor=INK, linewidth=0.9, zorder=_MARKS + 0.1)
     axes.add_collection(arrow, autolim=False)
-    _label(axes, course, course.start_tile, "START", color=BLUE, weight="bold")
+    _label(axes, course, course.start_tile, "START", color=INK, weight="bold")
     side = _entry(course)
     if side is not None:
-        band = PolyCollection(_chequers(course, side), facecolors=GREEN, zorder=_MARKS)
+        band = PolyCollection(_chequers(course, side), facecolors=INK, zorder=_MARKS)
         axes.add_collection(band, autolim=False)
     # The label keeps clear of the band.
     aside, down = (2 * _CHEQUER if side == over else 0.0 for over in (Side.LEFT, Side.UP))
-    _label(axes, course, course.goal, "GOAL", aside, down, color=GREEN, weight="bold")
+    _label(axes, course, course.goal, "GOAL", aside, down, color=INK, weight="bold")
 
 
 def _entry(course: Course) -> Side | None:
@@ -208,8 +208,8 @@ def _draw_things(axes: Axes, course: Course) -> None:
 
 
 def colour_of(obstacle: Obstacle) -> str:
-    """Return the colour an obstacle is drawn in: orange ones can be pushed."""
-    return ORANGE if obstacle.movable else FIXED
+    """Return the colour an obstacle is drawn in: pale ones can be pushed."""
+    return PALE if obstacle.movable else FIXED
 
 
 def _draw_thing(axes: Axes, shape: BaseGeometry, colour: str) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from gecar.plots.style import INK, PAPER, VERMILION
+from gecar.plots.style import INK, PAPER
 from gecar.world.robot import Robot
 
 Points = npt.NDArray[np.float64]
@@ -71,7 +71,7 @@ class RobotArtist:
             for wheel in (shape.left_wheel, shape.right_wheel)
         ]
         self.sensor = Circle(
-            shape.sensor[0], 0.009, facecolor=VERMILION, edgecolor=PAPER, zorder=order + 0.2, alpha=opacity
+            shape.sensor[0], 0.009, facecolor=INK, edgecolor=PAPER, zorder=order + 0.2, alpha=opacity
         )
         self.parts = [self.body, *self.wheels, self.sensor]
         for part in self.parts:

@@ -30,7 +30,7 @@ from gecar.plots.courses.robot import RobotArtist, shape_of
 from gecar.plots.drives.obstacles import draw_floor
 from gecar.plots.drives.program_listing import Listing
 from gecar.plots.drives.trajectory import choose
-from gecar.plots.style import CYCLE, INK, LIGHT, PAPER, SOFT, VERMILION, look, new_figure
+from gecar.plots.style import CYCLE, INK, LIGHT, PAPER, SOFT, look, new_figure
 from gecar.world.rollout import TRACE_S, Drive, World
 
 FRAMES_PER_S = 20
@@ -146,7 +146,7 @@ class Scene:
         self.below.set(
             ylabel="sensor [%]", xlabel="time [s]", ylim=(-6, 106), xlim=(0.0, max(float(t[-1]), TRACE_S))
         )
-        self.cursor = self.below.axvline(0.0, color=VERMILION, linewidth=1.4)
+        self.cursor = self.below.axvline(0.0, color=INK, linewidth=1.4)
 
     def frames(self, pace: float) -> Iterator[Frame]:
         """Yield the film, frame by frame, shape (height, width, 3)."""

@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from gecar.plots.courses.course import colour_of, draw_course
 from gecar.plots.courses.robot import placed
-from gecar.plots.style import INK, ORANGE
+from gecar.plots.style import INK, SOFT
 from gecar.world.course.course import Course
 from gecar.world.rollout import Drive
 
@@ -61,6 +61,6 @@ def draw_moved(axes: Axes, course: Course, drive: Drive) -> None:
         if moved > _MOVED_M:
             edge = placed(outline, *pose)
             axes.add_patch(
-                Polygon(edge, fill=False, edgecolor=ORANGE, linestyle=(0, (3, 2)), linewidth=1.0, zorder=2.4)
+                Polygon(edge, fill=False, edgecolor=SOFT, linestyle=(0, (3, 2)), linewidth=1.0, zorder=2.4)
             )
     obstacles.move(end)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from gecar.language import opcodes as op
 from gecar.plots.drives.path import Colouring, Trace
-from gecar.plots.style import BLUE, INK, ORANGE, SOFT
+from gecar.plots.style import INK, PALE, SOFT
 
 HEIGHT_RATIOS = (0.22, 1.0, 1.0, 1.0)
 
@@ -53,8 +53,9 @@ def _pair(
     right: npt.NDArray[np.float64],
     drawn: str = "default",
 ) -> None:
-    axes.plot(t, left, color=BLUE, linewidth=1.0, drawstyle=drawn, label="left")
-    axes.plot(t, right, color=ORANGE, linewidth=1.0, drawstyle=drawn, label="right")
+    """Draw both sides without hue: hues are of the program's lines."""
+    axes.plot(t, left, color=INK, linewidth=1.2, drawstyle=drawn, label="left")
+    axes.plot(t, right, color=PALE, linewidth=1.2, drawstyle=drawn, label="right")
 
 
 def _rate(t: npt.NDArray[np.float64], angle: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

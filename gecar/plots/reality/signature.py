@@ -145,10 +145,10 @@ def _draw_traces(traces: list[Axes], without: _Drive, with_it: _Drive, sight: bo
         if sight:
             bottom.plot(drive.t, drive.reflection, color=colour, linewidth=width)
     change = with_it.rows - without.rows
-    for column, colour, name in ((LEFT_ANGLE, BLUE, "left"), (RIGHT_ANGLE, ORANGE, "right")):
-        middle.plot(without.t, np.degrees(change[:, column]), color=colour, linewidth=1.2, label=name)
+    for column, colour, width, name in ((LEFT_ANGLE, BLUE, 3.0, "left"), (RIGHT_ANGLE, ORANGE, 1.2, "right")):
+        middle.plot(without.t, np.degrees(change[:, column]), color=colour, linewidth=width, label=name)
     if not sight:
-        bottom.plot(without.t, np.degrees(change[:, HEADING]), color=BLUE, linewidth=1.2)
+        bottom.plot(without.t, np.degrees(change[:, HEADING]), color=INK, linewidth=1.2)
     names = (
         "left shaft [rad/s]",
         "angles:\nchange [deg]",

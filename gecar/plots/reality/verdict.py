@@ -20,6 +20,7 @@ from gecar.plots.reality.law import laws_figure
 from gecar.plots.style import (
     BLUE,
     FAINT,
+    INK,
     LIGHT,
     SOFT,
     SPEED_COLOURS,
@@ -292,4 +293,4 @@ def _loudness(verdict: Verdict) -> Array:
 
 
 def _circle(x: float, y: float, radius: float) -> Circle:
-    return Circle((x, y), radius, fill=False, color=VERMILION, linewidth=1.6)
+    return Circle((x, y), radius, fill=False, color=INK, linewidth=1.6)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from gecar.plots.style import BLUE, GREEN, ORANGE, PURPLE, SOFT, headline, look, new_figure
+from gecar.plots.style import BLUE, GREEN, ORANGE, PURPLE, SOFT, VERMILION, headline, look, new_figure
 
 _PANELS = (
     ("size", "mean choices\nof a derivation", BLUE),
@@ -44,7 +44,7 @@ def population_figure(
             axes.set_ylabel(words)
             axes.set_ylim(bottom=0.0)
         _bound(panels[-1], math.log2(population))
-        for column, colour in (("valid", ORANGE), ("distinct", BLUE)):
+        for column, colour in (("valid", ORANGE), ("distinct", VERMILION)):
             shares.plot(
                 history["generation"], 100.0 * history[column], color=colour, marker=marker, label=column
             )
