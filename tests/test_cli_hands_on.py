@@ -89,7 +89,7 @@ def test_shells_can_complete_commands(gecar):
     assert "--install-completion" in gecar("--help").out
 
 
-def test_the_steps_of_a_long_command_take_one_line_of_a_terminal_and_a_line_each_of_a_file():
+def test_the_steps_of_a_long_command_take_one_line_of_a_terminal_and_few_of_a_file():
     lines, screen = [], io.StringIO()
     for terminal in (False, True):
         with Steps(
@@ -97,5 +97,7 @@ def test_the_steps_of_a_long_command_take_one_line_of_a_terminal_and_a_line_each
         ) as tell:
             tell("backlash: gains 12")
             tell("intervals")
-    assert lines == ["backlash: gains 12", "intervals"]
-    assert re.search(r"0:0\d:\d\d intervals", screen.getvalue())
+            tell.ended(1, 3)
+            tell("backlash again")
+    assert lines == ["backlash: gains 12"]  # the next comes 15 s later
+    assert re.search(r"0:0\d:\d\d 1 of 3, 0:00 left  backlash again", screen.getvalue())

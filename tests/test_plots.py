@@ -75,7 +75,7 @@ def test_a_film_keeps_the_colours_of_the_picture(tmp_path):
     film(SHORT, LAPS, drive, tmp_path / "drive.gif", pace=4.0)
     with Image.open(tmp_path / "drive.gif") as image:
         seen = np.unique(np.asarray(image.convert("RGB")).reshape(-1, 3), axis=0)
-    for colour in (style.BLUE, style.VERMILION):
+    for colour in (style.BLUE, style.INK):
         assert np.abs(seen - 255 * np.array(to_rgb(colour))).sum(axis=1).min() < 20
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 import time
 from collections.abc import Callable, Sequence
 from types import TracebackType
@@ -13,7 +15,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from gecar.evolution.history import Generation, pace
 from gecar.evolution.scores import UNSOLVED
 
-PLAIN_EVERY_S = 5.0
+PLAIN_EVERY_S = 15.0
+"""How often a plain line is said at most [s]."""
 
 
 class _LiveLine:
@@ -73,7 +76,7 @@ class Steps(_LiveLine):
     Parameters
     ----------
     say
-        What prints a step where there is no terminal.
+        What prints a step where there is no terminal: the first, and then one in `PLAIN_EVERY_S` at most.
     console
         Where the line is shown; default: stderr.
     """
@@ -81,6 +84,9 @@ class Steps(_LiveLine):
     def __init__(self, say: Callable[[str], None], console: Console | None = None) -> None:
         self.say = say
         self.live = None
+        self._said = -math.inf
+        self._begun = time.monotonic()
+        self._ahead = ""
         console = console or Console(stderr=True, highlight=False)
         if console.is_terminal:
             columns = (
@@ -88,15 +94,24 @@ class Steps(_LiveLine):
                 TimeElapsedColumn(),
                 TextColumn("{task.description}", style="dim", markup=False),
             )
-            self.live = Progress(*columns, console=console, transient=True)
+            shown = sys.stdout.isatty()  # else what is said on stdout would go to the terminal
+            self.live = Progress(*columns, console=console, transient=True, redirect_stdout=shown)
             self.task = self.live.add_task("starting ...", total=None)
 
     def __call__(self, step: str) -> None:
         """Show a step that begins or has ended."""
         if self.live:
-            self.live.update(self.task, description=step.strip())
-        else:
+            self.live.update(self.task, description=f"{self._ahead}{step.strip()}")
+        elif time.monotonic() - self._said > PLAIN_EVERY_S:
+            self._said = time.monotonic()
             self.say(step)
+
+    def ended(self, done: int, of: int) -> None:
+        """Count cases that have ended, and say from then on how long the others take if they are alike."""
+        left = round((time.monotonic() - self._begun) * (of - done) / done)
+        self._ahead = f"{done} of {of}, {left // 60}:{left % 60:02d} left  "
+        if self.live:
+            self.live.update(self.task, description=self._ahead)
 
 
 def line(history: Sequence[Generation], generations: int) -> str:

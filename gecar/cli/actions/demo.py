@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from gecar.calling import command
-from gecar.cli.actions.discover import draw, teller, write
+from gecar.cli.actions.discover import draw, keep_still, teller, write
 from gecar.cli.actions.evolve import begin, finish_watched, say_if_cold
 from gecar.cli.actions.run_pictures import draw_run
 from gecar.cli.output import Output
+from gecar.cli.progress import Steps
 from gecar.errors import expected
 from gecar.files import write_whole
 from gecar.language.program import Program, read_program
@@ -132,8 +134,8 @@ class Demo:
             folder,
         )
         case = read_case(folder)
-        tell = (lambda line: None) if self.quiet else teller(self.output)  # noqa: ARG005
-        verdict = discover(case, _drives(), tell=tell)
+        with nullcontext(keep_still) if self.quiet else Steps(teller(self.output)) as tell:
+            verdict = discover(case, _drives(), tell=tell)
         write(verdict, self.out / "verdict")
         faults = concealed(world.robot, verdict)
         self.output.print(title(verdict))

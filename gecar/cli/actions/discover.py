@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import typer
 
 from gecar.cli.output import Output
+from gecar.cli.progress import Steps
 from gecar.errors import InputError
 from gecar.files import json_ready, json_text, write_whole
 from gecar.language.grammar import Grammar
@@ -73,11 +74,11 @@ class Shown(NamedTuple):
     article: str
 
 
-def _keep_still(line: str) -> None:
+def keep_still(line: str) -> None:
     """Say nothing."""
 
 
-def conclude(task: Task, out: Path, tell: Callable[[str], None] = _keep_still) -> Told:
+def conclude(task: Task, out: Path, tell: Callable[[str], None] = keep_still) -> Told:
     """Discover what a case's simulation lacks, and write the verdict's files into a folder, made at the end.
 
     Raises
@@ -106,16 +107,15 @@ def write(verdict: Verdict, out: Path) -> dict[str, Any]:
     return table
 
 
-def conclude_away(task: Task, tell: Callable[[str], None] = _keep_still) -> Told:
+def conclude_away(task: Task, tell: Callable[[str], None] = keep_still) -> Told:
     """Do the same where the sender's folders need not be, and hand the files back."""
     with tempfile.TemporaryDirectory(prefix="verdict-") as folder:
-        tell(f"{task.case.name}:")
-        told = conclude(task, Path(folder), tell)
+        told = conclude(task, Path(folder), lambda step: tell(f"{task.case.name}: {step}"))
         return told._replace(files={path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())})
 
 
 def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers: int, scheduler: str) -> None:
-    """Conclude cases side by side, write each as it ends, and name those that failed.
+    """Conclude cases side by side, write each as it ends and say it in a line, and name those that failed.
 
     Parameters
     ----------
@@ -143,12 +143,15 @@ def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers:
         if isinstance(error, Exception):
             failed[out] = error
         else:
-            answers[out] = _written(output, out, future.result())
+            answers[out] = _written(output, out, future.result(), brief=len(tasks) > 1)
+        steps.ended(len(answers) + len(failed), len(tasks))
 
     place = Workplace.of(kind, workers, scheduler)
-    work = partial(conclude_away, tell=teller(output)) if kind == "serial" else conclude_away
+    steps = Steps(teller(output))
     try:
-        perform_each(place, work, list(tasks.items()), keep)
+        with steps:
+            work = partial(conclude_away, tell=steps) if kind == "serial" else conclude_away
+            perform_each(place, work, list(tasks.items()), keep)
     except InputError as error:  # workers that die again and again, a scheduler that went away
         failed |= {out: error for out in tasks if out not in answers and out not in failed}
     for out, why in failed.items():
@@ -173,13 +176,15 @@ def say(output: Output, told: Told, out: Path) -> None:
     output.print(f"Written to {out}.")
 
 
-def _written(output: Output, out: Path, told: Told) -> dict[str, Any]:
-    """Write and say what was made elsewhere; return the JSON object."""
+def _written(output: Output, out: Path, told: Told, *, brief: bool) -> dict[str, Any]:
+    """Write what was made elsewhere and say it, in a line where brief; return the JSON object."""
     out.mkdir(parents=True, exist_ok=True)
     for name, content in told.files.items():
         write_whole(out / name, content)
-    output.print(f"{out.name}:")
-    say(output, told, out)
+    if brief:
+        output.print(f"{out.name}: {told.sentences[0]} Written to {out}.")
+    else:
+        say(output, told, out)
     return told.table
 
 
