@@ -72,12 +72,12 @@ MAIN_SHARE = Threshold(
 STEADY = Threshold(
     0.06,
     "relative spread of an effect's size over recordings beside much that is unexplained, from which on it imitates",
-    "10 cases of the 3D engine: causes 0.00 to 0.06, imitations 0.10 to 0.27; dusty tyres of the continuous world: 0.08",
+    "11 cases of two worlds: causes 0.00 to 0.06, imitations 0.08 to 0.27",
 )
 DRIFTING = Threshold(
     0.25,
     "relative spread of the size of an effect or a law over recordings, times or regimes from which on it drifts",
-    "20 cases with backgrounds: causes 0.00 to 0.17, imitations 0.28 to 3; right laws 0.01 to 0.21, wrong ones 0.07 to 0.9",
+    "20 cases: causes 0.00 to 0.17, imitations 0.28 to 3; right laws 0.01 to 0.21, wrong ones 0.07 to 0.9",
 )
 LEFT_SHARE = Threshold(
     0.03,
