@@ -134,33 +134,50 @@ def concluded(
     tried: Sequence[tuple[Step, ...]],
     drifting: tuple[Step, ...] = (),
 ) -> Explanation:
-    """Judge what effects leave, and which of them are material.
-
-    Those are no findings whose size differs between recordings, times or regimes. Where they leave something material,
-    those are none that are smaller than the catalogue's size: they may be part of what is left. Where they leave much
-    of it, others must have one size in all recordings to a few percent, and explain a good part of what is left without
-    them. ``drifting`` are those known to differ.
-    """
+    """Judge what effects leave, and which of them are material; ``drifting`` are those known to have no one size."""
     problem = problem.under(model)
-    weakest = _weakest_drifting(problem, model, steps)
-    if weakest is not None:
-        kept = [step for step in steps if step is not weakest]
-        fitted = _fitted_anew(problem, model, kept)
-        beside = [_beside_others(problem, fitted, step) for step in kept]
-        return concluded(problem, fitted, beside, tried, (*drifting, replace(weakest, drifts=True)))
-    left = _left(problem, model)
-    initial = problem.sizes.left(problem.known.physics, repeatedly=True)
-    now, before = (problem.material.times(size) for size in (left, initial))
-    if _is_much(model, now, before):
-        hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
-        kept = [
-            step
-            for step in steps
-            if (problem.on_bench or is_worthwhile(model, step.effect))
-            and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
-        ]
-        if len(kept) < len(steps):
-            return concluded(problem, _fitted_anew(problem, model, kept), kept, tried, drifting)
+    while True:
+        weakest = _weakest_drifting(problem, model, steps)
+        if weakest is not None:
+            kept = [step for step in steps if step is not weakest]
+            drifting = (*drifting, replace(weakest, drifts=True))
+        else:
+            left = _left(problem, model)
+            kept = _standing_beside(problem, model, steps, left)
+        if len(kept) == len(steps):
+            return _by_size(problem, model, steps, left, tried, drifting)
+        model = _fitted_anew(problem, model, kept)
+        problem = problem.under(model)
+        steps = kept if weakest is None else [_beside_others(problem, model, step) for step in kept]
+
+
+def _standing_beside(problem: Problem, model: Model, steps: Sequence[Step], left: Size) -> list[Step]:
+    """Return the effects that stand beside what they leave: all, unless that is material.
+
+    Then smaller ones than the catalogue's size do not: they may be part of what is left. Where they leave much of it,
+    others must have one size in all recordings to a few percent, and explain a good part of what is left without them.
+    """
+    now, before = _times(problem, left)
+    if not _is_much(model, now, before):
+        return list(steps)
+    hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
+    return [
+        step
+        for step in steps
+        if (problem.on_bench or is_worthwhile(model, step.effect))
+        and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
+    ]
+
+
+def _by_size(
+    problem: Problem,
+    model: Model,
+    steps: Sequence[Step],
+    left: Size,
+    tried: Sequence[tuple[Step, ...]],
+    drifting: tuple[Step, ...],
+) -> Explanation:
+    """Return the explanation whose effects are those that are material, the others fitted no more."""
     minor = tuple(step for step in steps if not is_material(problem, model, step))
     named, whole = tuple(step for step in steps if step not in minor), model
     if minor:  # what carries no claim bends no other effect's size
@@ -168,9 +185,14 @@ def concluded(
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
         left = _left(problem, model)
-        now = problem.material.times(left)
-    much = _is_much(model, now, before)
+    much = _is_much(model, *_times(problem, left))
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
+
+
+def _times(problem: Problem, left: Size) -> tuple[float, float]:
+    """Return how many times the line of what is material is left, and was before anything was fitted."""
+    initial = problem.sizes.left(problem.known.physics, repeatedly=True)
+    return problem.material.times(left), problem.material.times(initial)
 
 
 def _left(problem: Problem, model: Model) -> Size:
