@@ -101,3 +101,11 @@ def test_the_steps_of_a_long_command_take_one_line_of_a_terminal_and_few_of_a_fi
             tell("backlash again")
     assert lines == ["backlash: gains 12"]  # the next comes 15 s later
     assert re.search(r"0:0\d:\d\d 1 of 3, 0:00 left  backlash again", screen.getvalue())
+
+
+def test_the_line_of_one_case_says_when_it_is_usually_done():
+    screen = io.StringIO()
+    shown = Console(file=screen, force_terminal=True, width=80, color_system=None)
+    with Steps(print, shown, within_s=75.0) as tell:
+        tell("intervals")
+    assert "usually done by 1:15  intervals" in screen.getvalue()

@@ -79,14 +79,18 @@ class Steps(_LiveLine):
         What prints a step where there is no terminal: the first, and then one in `PLAIN_EVERY_S` at most.
     console
         Where the line is shown; default: stderr.
+    within_s
+        By when it has usually ended [s]; 0: nobody knows.
     """
 
-    def __init__(self, say: Callable[[str], None], console: Console | None = None) -> None:
+    def __init__(
+        self, say: Callable[[str], None], console: Console | None = None, within_s: float = 0.0
+    ) -> None:
         self.say = say
         self.live = None
         self._said = -math.inf
         self._begun = time.monotonic()
-        self._ahead = ""
+        self._ahead = f"usually done by {_minutes(within_s)}  " if within_s else ""
         console = console or Console(stderr=True, highlight=False)
         if console.is_terminal:
             columns = (
@@ -108,10 +112,15 @@ class Steps(_LiveLine):
 
     def ended(self, done: int, of: int) -> None:
         """Count cases that have ended, and say from then on how long the others take if they are alike."""
-        left = round((time.monotonic() - self._begun) * (of - done) / done)
-        self._ahead = f"{done} of {of}, {left // 60}:{left % 60:02d} left  "
+        left_s = (time.monotonic() - self._begun) * (of - done) / done
+        self._ahead = f"{done} of {of}, {_minutes(left_s)} left  "
         if self.live:
             self.live.update(self.task, description=self._ahead)
+
+
+def _minutes(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d}"
 
 
 def line(history: Sequence[Generation], generations: int) -> str:

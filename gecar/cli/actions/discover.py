@@ -29,6 +29,9 @@ from gecar.report.verdict import words
 from gecar.world.effects import Effect
 from gecar.world.robot import Robot, write_robot
 
+USUAL = 0.6
+"""Seconds of one processor in which nine of ten cases are done, a second of recordings (docs/discover.md)."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -162,6 +165,11 @@ def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers:
     output.print_json(named if len(tasks) > 1 else next(iter(answers.values())))
     if failed:
         raise typer.Exit(2 if all(isinstance(why, InputError) for why in failed.values()) else 1)
+
+
+def usual_s(case: Case) -> float:
+    """Return by when nine of ten cases like this one are done [s]."""
+    return USUAL * sum(float(run.t_s[-1] - run.t_s[0]) for run in case.recordings)
 
 
 def teller(output: Output) -> Callable[[str], None]:

@@ -97,7 +97,7 @@ def discover(
       gecar discover recordings/* --out verdicts --executor process
       gecar evolve --robot verdicts/monday/robot.toml
     """
-    from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller
+    from gecar.cli.actions.discover import Task, conclude, conclude_all, say, teller, usual_s
     from gecar.cli.inputs import find_program, warnings_of
     from gecar.cli.progress import Steps
     from gecar.language.program import read_program
@@ -146,7 +146,7 @@ def discover(
     if kind != "serial" or len(tasks) > 1:
         conclude_all(output, tasks, kind, workers or usable_cores(), scheduler)
         return
-    with Steps(teller(output)) as tell:
+    with Steps(teller(output), within_s=usual_s(tasks[out].case)) as tell:
         told = conclude(tasks[out], out, tell)
     say(output, told, out)
     output.print_json(told.table)
