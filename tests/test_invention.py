@@ -15,11 +15,14 @@ import numpy as np
 import pytest
 from concealing import EV3, recorded
 
+from gecar.cli.actions.discover import draw
 from gecar.errors import InputError
 from gecar.language.grammar import parse_grammar
-from gecar.plots.reality.law import laws_figure
+from gecar.plots.reality.law import along_ways, laws_figure, laws_map_figure
+from gecar.plots.reality.verdict import verdict_drawings, verdict_tables
 from gecar.plots.style import is_whole
 from gecar.reality import discovery
+from gecar.reality.compare.choices import Told
 from gecar.reality.discovery import discover
 from gecar.reality.invent.invention import Written
 from gecar.reality.invent.looks import looks_like
@@ -278,7 +281,7 @@ def test_a_robot_that_is_full_of_laws_gets_no_more_than_fit(own):
     assert verdict.robot.physics["n_terms"] == len(verdict.robot.term)
 
 
-def test_a_law_is_told_in_words_numbers_and_pictures():
+def test_a_law_is_told_in_words_numbers_and_pictures(tmp_path):
     verdict = verdict_on(SAG)
     assert (
         sentences(verdict)[0]
@@ -291,8 +294,26 @@ def test_a_law_is_told_in_words_numbers_and_pictures():
     assert low == 0.0
     assert high > 1.0
     assert "supply_voltage = -1.5" in verdict_html(verdict, {})
+    draw(verdict, tmp_path)
+    assert "The law that was written" in (tmp_path / "report.html").read_text()
     for each in (verdict, verdict_on(*TILT), verdict_on(DRAG)):
         assert is_whole(laws_figure(each))
+
+
+def test_a_law_of_the_place_is_drawn_on_the_floor():
+    verdict = verdict_on(*TILT)
+    told = Told((), ())
+    assert "law_map" not in verdict_drawings(verdict, told)
+    pull = Term(port="force_toward", law="c1 * distance", c1=0.4, at_x=1.5, at_y=0.4)
+    law = replace(verdict.invented[0], term=pull)
+    verdict = replace(verdict, invented=(law, verdict.invented[1]), robot=EV3.with_terms([pull]))
+    assert "law_map" in verdict_drawings(verdict, told)
+    assert is_whole(laws_map_figure(verdict))
+    _, x, y, force = np.concatenate(along_ways(verdict, law)).T
+    assert force == pytest.approx(0.4 * np.hypot(x - 1.5, y - 0.4))
+    table = verdict_tables(verdict, told)["law_map"].splitlines()
+    assert len(table) == 1 + len(x)
+    assert table[1].startswith("force_toward,")
 
 
 @needs_practice

@@ -60,6 +60,7 @@ text-align:left;border-bottom:1px solid #D8DEE4;vertical-align:top;overflow-wrap
 _CAPTIONS = {
     "gap": "The gap on held-out recordings", "where": "In which motion", "traces": "Measured, before and after",
     "map": "At which place", "tried": "Candidates, and the error each leaves", "law": "The law that was written",
+    "law_map": "Where the law acts",
 }  # fmt: skip
 NO_TABLES: Mapping[str, str] = MappingProxyType({})
 _KINDS = {PLACE: "", WHEELS: " of a wheel's turn", READING: " of a reading"}
@@ -68,7 +69,7 @@ _KINDS = {PLACE: "", WHEELS: " of a wheel's turn", READING: " of a reading"}
 def verdict_html(verdict: Verdict, pictures: Mapping[str, bytes]) -> str:
     """Return a verdict for a notebook, or a page of one's own: words, lists and pictures (PNG files by name)."""
     beside = side_by_side(verdict, only_set_aside=True) if verdict.evidence is not None else ()
-    shown = "".join(_picture(name, png) for name, png in pictures.items())
+    shown = "".join(picture_of(name, png) for name, png in pictures.items())
     return f"<div class='verdict'>{first_screen(verdict, beside)}{shown}</div>{article(verdict)}"
 
 
@@ -121,7 +122,11 @@ def _turned(run: Beside, measure: str, verdict: Verdict) -> str:
 
 
 def article(
-    verdict: Verdict, made: Sequence[Choice] = (), tables: Mapping[str, str] = NO_TABLES, shown: str = ""
+    verdict: Verdict,
+    made: Sequence[Choice] = (),
+    tables: Mapping[str, str] = NO_TABLES,
+    shown: str = "",
+    laws: str = "",
 ) -> str:
     """Return what follows: what was found, the other candidates, what to record next, and how it was found.
 
@@ -134,11 +139,13 @@ def article(
     tables
         The data behind pictures as CSV, by name, to be downloaded.
     shown
-        HTML of pictures.
+        HTML of pictures, for the statistics.
+    laws
+        HTML of pictures of the laws.
     """
     commands = _csv_link("next_recording", _next(verdict), "The commands")
     parts = [
-        _found(verdict),
+        _found(verdict, laws),
         _why(made),
         f"<h2>What to record next</h2><p>{_text(_capital(_in_words(verdict.next_recording.why)))}. {commands}</p>",
         _how(verdict, tables, shown),
@@ -164,11 +171,11 @@ def _capital(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _found(verdict: Verdict) -> str:
+def _found(verdict: Verdict, laws: str) -> str:
     parts = []
     if verdict.found:
         cards = [_card(found, verdict) for found in verdict.effects] + [_law(law) for law in verdict.invented]
-        parts.append("<h2>What was found</h2>" + "".join(cards))
+        parts.append("<h2>What was found</h2>" + "".join(cards) + laws)
     if verdict.residual.material or verdict.verdict.endswith("unexplained"):
         parts.append(f"<h2>The remaining error</h2><p>{_text(unexplained(verdict))}</p>")
     if verdict.minor:
@@ -311,7 +318,8 @@ def picture_html(name: str, png: bytes, words: str) -> str:
     return f"<h3>{_text(name)}</h3><div class='wide'>{image}</div>"
 
 
-def _picture(name: str, png: bytes) -> str:
+def picture_of(name: str, png: bytes) -> str:
+    """Return one of a verdict's pictures inside a page, under its title."""
     return picture_html(_CAPTIONS.get(name, name), png, _CAPTIONS.get(name, name))
 
 

@@ -202,7 +202,7 @@ def draw(verdict: Verdict, out: Path) -> Shown:
     from gecar.plots.reality.verdict import verdict_figures, verdict_tables
     from gecar.plots.style import save
     from gecar.reality.compare.choices import tell
-    from gecar.report.verdict_page import article, first_screen, picture_html
+    from gecar.report.verdict_page import article, first_screen, picture_html, picture_of
 
     told = tell(verdict)
     paths = {
@@ -216,7 +216,8 @@ def draw(verdict: Verdict, out: Path) -> Shown:
     )
     picture = picture_html("In what motion it shows", paths["where"].read_bytes(), words)
     inside = {name: table for name, table in tables.items() if name in ("gap", "where")}
-    below = article(verdict, told.choices, inside, picture)
+    laws = [picture_of(name, paths[name].read_bytes()) for name in ("law", "law_map") if name in paths]
+    below = article(verdict, told.choices, inside, picture, "".join(laws))
     write_whole(
         out / "report.html", replay_page(verdict, told.shown, first_screen(verdict, told.shown), below)
     )

@@ -1,4 +1,4 @@
-"""Invented laws as curves with their 95 % bands; grey where no recording went."""
+"""Invented laws as curves with 95 % bands, grey where no recording went; and on the floor, along the ways driven."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from gecar.plots.style import BLUE, FAINT, INK, SOFT, headline, look, new_figure
+from gecar.plots.courses.course import draw_course
+from gecar.plots.style import BLUE, FAINT, INK, SOFT, VERMILION, headline, look, new_figure
+from gecar.reality.invent.states import states
 from gecar.reality.verdict import Invented, Verdict
-from gecar.world.ports import BY_PORT, VARIABLE, VARIABLES
+from gecar.world.course.course import load_course
+from gecar.world.ports import BY_PORT, TOWARD_A_POINT, VARIABLE, VARIABLES
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +27,8 @@ DRAWS = 200  # of constants within their intervals, for the band
 _VARIABLES = {variable.id: variable for variable in VARIABLES}
 _NOWHERE = {"time": np.zeros(())}
 _ANGLES = ("angle", "other_angle", "heading")
+_OF_PLACE = frozenset(("x", "y", "distance"))
+MAP_IN = 4.3
 
 
 def laws_figure(verdict: Verdict) -> Figure:
@@ -42,6 +48,62 @@ def laws_figure(verdict: Verdict) -> Figure:
         drawn = "95 % band; grey: outside the recordings" if any(telling) else "95 % interval"
         headline(figure, "The law that was written", drawn)
     return figure
+
+
+def local_laws(verdict: Verdict) -> tuple[Invented, ...]:
+    """Return the laws that depend on the place."""
+    return tuple(law for law in verdict.invented if not _OF_PLACE.isdisjoint(law.term.parsed.variables))
+
+
+def laws_map_figure(verdict: Verdict) -> Figure:
+    """Draw what every law that depends on the place gives along the ways driven in the recordings fitted on."""
+    laws, setup = local_laws(verdict), verdict.evidence.fitted.recordings[0].recording.setup
+    figure = new_figure(9.0, 0.8 + MAP_IN * len(laws))
+    figure.set_layout_engine("compressed")
+    with look():
+        for axes, law in zip(figure.subplots(len(laws), 1, squeeze=False)[:, 0], laws, strict=True):
+            axes.set_title(law.term.typeset, fontsize=9)
+            if setup.course != "none":
+                draw_course(axes, load_course(setup.course), marks=False)
+            ways = along_ways(verdict, law)
+            most = max(float(np.abs(way[:, 3]).max()) for way in ways) or 1.0
+            for _, x, y, value in (way.T for way in ways):
+                axes.plot(x, y, color=FAINT, linewidth=4.6, zorder=2.9)
+                points = np.column_stack([x, y])
+                pieces = list(np.stack([points[:-1], points[1:]], axis=1))
+                lines = LineCollection(pieces, cmap="PuOr", linewidths=2.6, zorder=3, capstyle="round")
+                lines.set_array(value[:-1])
+                lines.set_clim(-most, most)
+                axes.add_collection(lines)
+            if _has_point(law):
+                at = law.term.constants
+                axes.plot(
+                    at["at_x"], at["at_y"], "x", color=VERMILION, markersize=10, markeredgewidth=2.5, zorder=4
+                )
+            axes.update_datalim(np.concatenate(ways)[:, 1:3])
+            axes.autoscale(enable=True)
+            axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+            figure.colorbar(lines, ax=axes, label=_what(law), shrink=0.8)
+        cross = "; cross: the point it is counted from" if any(map(_has_point, laws)) else ""
+        headline(figure, "Where the law acts", f"along the ways driven; white: nothing{cross}")
+    return figure
+
+
+def along_ways(verdict: Verdict, law: Invented) -> list[Array]:
+    """Return time [s], place [m, m] and what a law gives there in the port's unit, shape (rows, 4) a recording.
+
+    As the robot with the laws has them; of a law of each wheel the mean of both.
+    """
+    physics, out = verdict.robot.physics, list[Array]()
+    for run in verdict.evidence.fitted.recordings:
+        seen = states(run, physics, law.term)
+        value = law.term.value(seen).mean(axis=1)
+        out.append(np.column_stack([run.replayer.t, seen["x"][:, 0], seen["y"][:, 0], value]))
+    return out
+
+
+def _has_point(law: Invented) -> bool:
+    return law.term.port in TOWARD_A_POINT
 
 
 def _draw_value(axes: Axes, law: Invented) -> None:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from gecar.plots.courses.course import draw_course
-from gecar.plots.reality.law import laws_figure
+from gecar.plots.reality.law import along_ways, laws_figure, laws_map_figure, local_laws
 from gecar.plots.style import (
     BLUE,
     FAINT,
@@ -69,6 +69,8 @@ def verdict_drawings(verdict: Verdict, told: Told | None = None) -> dict[str, Ca
         drawings["map"] = map_figure
     if verdict.invented:
         drawings["law"] = laws_figure
+    if local_laws(verdict):
+        drawings["law_map"] = laws_map_figure
     return drawings
 
 
@@ -101,6 +103,10 @@ def verdict_tables(verdict: Verdict, told: Told) -> dict[str, str]:
         for one, path, loud in zip(where.runs, where.path, _loudness(verdict), strict=True):
             seen = np.flatnonzero(~np.isnan(path[:, 0]))
             rows["map"] += [[one.recording.name, 0.1 * k, *path[k], loud[k]] for k in seen]
+    rows["law_map"] = [["law", "recording", "t_s", "x_m", "y_m", "value"]]
+    for law in local_laws(verdict):
+        for one, way in zip(verdict.evidence.fitted.recordings, along_ways(verdict, law), strict=True):
+            rows["law_map"] += [[law.term.port, one.recording.name, *at] for at in way.tolist()]
     return {name: _csv(table) for name, table in rows.items() if len(table) > 1}
 
 
