@@ -162,6 +162,14 @@ def test_on_a_bench_a_part_that_brings_little_of_the_gain_is_dropped():
     assert left_out_gains(library, whole).sum() - gains.sum() > PRICE
 
 
+def test_on_a_bench_laws_are_written_as_long_as_each_is_proved():
+    faint = frozen(port="motor_torque", law="c1 * speed * abs(speed)", c1=-4e-6)  # 2 mm in a metre
+    runs = tuple(recorded(robot_with(dict(SAG), dict(faint)), seed, rig="bench") for seed in range(5))
+    verdict = discover(Case("motor", runs), catalogue=UNRELATED, language=FEW, invents=True)
+    assert [law.term.port for law in verdict.invented] == ["supply_voltage", "motor_torque"]
+    assert verdict.invented[1].parameters["c1"].value == pytest.approx(-4e-6, rel=0.2)
+
+
 ONE_MOTOR = parse_grammar(
     """
     <term> ::= motor_torque: c * <f> | motor_torque: c * sin(1 * angle) + c * cos(1 * angle); side: each
