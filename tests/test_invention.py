@@ -149,6 +149,32 @@ def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     assert [term.law for term in simplified(library, law)[0].terms] == ["c1 * speed * abs(speed)"]
 
 
+TOOTH = frozen(
+    port="gear_friction",
+    law="c1 * exp(k1 * cos(angle - k2))",
+    c1=0.03 * np.exp(-9.0),
+    k1=9.0,
+    k2=1.2,
+    side="right",
+)
+TEETH = parse_grammar(
+    """
+    <term> ::= gear_friction: c * exp(4 * cos(angle - <turned>)); side: <side> | gear_friction: c * <f>
+    <f> ::= 1 | side * 1 | abs(sin(1 * angle)) | side * abs(sin(1 * angle))
+    <turned> ::= 0.8 | 2.4 | 3.9 | 5.5
+    <side> ::= left | right
+    """
+)
+
+
+def test_a_gear_that_sticks_at_one_angle_of_the_turn_is_found():
+    (law,) = verdict_on(TOOTH, invents=True, language=TEETH).invented
+    assert law.looks_like == "a gear that sticks at one angle of a turn, on the right wheel alone"
+    assert law.parameters["k2"].value == pytest.approx(1.2, abs=0.05)
+    turn = {"angle": np.linspace(0.0, 2.0 * np.pi, 200)}
+    assert law.term.value(turn).mean() == pytest.approx(Term(**dict(TOOTH)).value(turn).mean(), rel=0.1)
+
+
 FAINT_RIPPLE = frozen(port="motor_torque", law="c1 * sin(2 * angle)", c1=1.5e-3)
 
 
@@ -411,6 +437,8 @@ def test_sums_are_taken_apart_and_put_together():
          "a pull toward (1.21, 0.58) growing with distance: a spring"),
         ({"port": "rolling_radius", "law": "c1 * sin(k1 * angle) + c2 * cos(k2 * angle)", "c1": 0.1, "c2": 0.1,
           "k1": 1.0, "k2": 1.0}, "a wheel off its centre by 4.0 mm"),
+        ({"port": "motor_torque", "law": "c1 * angle", "c1": -0.01, "side": "left"},
+         "a spring that winds up as the wheel turns, on the left wheel alone"),
         ({"port": "motor_torque", "law": "c1 * store * command", "c1": -0.1, "store": "draw", "store_s": 15.0},
          "grows over the first 30 s of use and stays: heat"),
         ({"port": "command", "law": "c1 * (store - command)", "c1": 2.0, "store": "command", "store_s": 0.03},

@@ -31,11 +31,14 @@ _RATES = (
 _KNOWN = (
     _Known(_TORQUE, r"speed \* abs\(speed\)", "drag growing with the square of the wheel's speed",
            "a push growing with the square of the wheel's speed"),
+    _Known(_TORQUE, r"angle", "a spring that winds up as the wheel turns", "a push growing as the wheel turns"),
     _Known(_TORQUE, r"speed", "friction growing with speed", "a push growing with speed"),
     _Known(_TORQUE, r"sign\(speed\)", "dry friction in the gears", "less dry friction than the robot's file says"),
     _Known(_TORQUE, r"command", "weaker motors", "stronger motors"),
     _Known(_TORQUE, r"current", "motors that give less torque a current", "motors that give more torque a current"),
     _Known(("gear_friction",), r"1", "less dry friction than the robot's file says", "more dry friction in the gears"),
+    _Known(("gear_friction",), r"exp\(\w+ \* cos\(angle - \w+\)\)", "a gear that turns easily at one angle of a turn",
+           "a gear that sticks at one angle of a turn"),
     _Known(("gear_friction",), r"(abs\(speed\)|speed)", "friction that falls with speed",
            "friction that grows with speed"),
     _Known(("command",), r"command", "motors that do less than they are told",
@@ -130,12 +133,16 @@ def _lens(term: Term) -> str:
 
 
 def _once_per_turn(term: Term) -> str:
-    if ("sin(" not in term.law and "cos(" not in term.law) or "angle" not in term.law:
-        return ""
     cycles = sorted(
-        {round(v) for name, v in term.constants.items() if re.search(rf"{name} \* angle", term.law)}
+        {
+            round(v)
+            for name, v in term.constants.items()
+            if re.search(rf"(sin|cos)\({name} \* angle", term.law)
+        }
     )
-    often = {1: "once", 2: "twice"}.get(cycles[0], f"{cycles[0]} times") if cycles else "often"
+    if not cycles:
+        return ""
+    often = {1: "once", 2: "twice"}.get(cycles[0], f"{cycles[0]} times")
     size = sum(abs(term.constants[name]) ** 2 for name in linear(term)) ** 0.5
     if term.port == "rolling_radius" and cycles == [1]:
         return f"once per wheel turn: a wheel off its centre by {1e3 * size * 0.028:.1f} mm on 28 mm"
