@@ -27,6 +27,7 @@ from gecar.files import json_ready, write_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.sentences import physics_grammar
 from gecar.reality.recordings.recording import read_case
+from gecar.reality.verdict import Verdict
 from gecar.report.table import piped
 from gecar.world.effects import CATALOGUE
 from gecar.world.robot import write_robot
@@ -94,21 +95,35 @@ NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""
 
 
+def _concealed(label: dict[str, Any]) -> tuple[list[str], str]:
+    """Return the effects that a label says are concealed, and the physics outside the catalogue."""
+    return [effect["id"] for effect in label["effects"]], (label.get("outside") or {}).get("id", "")
+
+
+def judged(folder: Path, label: dict[str, Any], seed: int = 0) -> Verdict:
+    """Return a case's verdict with laws asked for; if it conceals one effect alone, by a catalogue without it."""
+    concealed, outside = _concealed(label)
+    single = len(concealed) == 1 and not outside
+    return discover(
+        read_case(folder),
+        seed=seed,
+        workers=1,
+        catalogue=[effect for effect in CATALOGUE if not single or effect.id not in concealed],
+        language=physics_grammar(),
+        invents=True,
+    )
+
+
 def look_at(folder: Path, label: dict[str, Any], out: Path, seed: int = 0) -> dict[str, Any]:
     """Return what a case's verdict says with laws asked for, and what it is worth; ``out`` gets the robot's file."""
-    concealed = [effect["id"] for effect in label["effects"]]
-    outside = (label.get("outside") or {}).get("id")
-    single = len(concealed) == 1 and outside is None
-    catalogue = [effect for effect in CATALOGUE if not single or effect.id not in concealed]
+    concealed, outside = _concealed(label)
     began = time.process_time(), time.perf_counter()
-    verdict = discover(
-        read_case(folder), seed=seed, workers=1, catalogue=catalogue, language=physics_grammar(), invents=True
-    )
+    verdict = judged(folder, label, seed)
     table = verdict.as_json()
     write_robot(verdict.robot, out / f"{folder.name}.toml")
     return json_ready(
         {
-            "kind": "none" if not concealed and outside is None else "single" if single else "outside",
+            "kind": "outside" if outside or len(concealed) > 1 else "single" if concealed else "none",
             "concealed": outside or (concealed[0] if concealed else ""),
             "verdict": verdict.verdict,
             "effects": [found.id for found in verdict.effects],

@@ -39,15 +39,21 @@ def laws_figure(verdict: Verdict) -> Figure:
     figure = new_figure(8.0, 1.0 + sum(heights))
     with look():
         panels = figure.subplots(len(laws), 1, squeeze=False, height_ratios=heights)[:, 0]
-        for axes, law, name in zip(panels, laws, telling, strict=True):
+        for axes, law in zip(panels, laws, strict=True):
             axes.set_title(law.term.typeset, fontsize=9)
-            if name is None:
-                _draw_value(axes, law)
-            else:
-                _draw_curve(axes, law, name)
+            draw_law(axes, law)
         drawn = "95 % band; grey: outside the recordings" if any(telling) else "95 % interval"
         headline(figure, "The law that was written", drawn)
     return figure
+
+
+def draw_law(axes: Axes, law: Invented) -> None:
+    """Draw a law over the variable it depends on most, or as one value with its interval."""
+    name = _telling(law)
+    if name is None:
+        _draw_value(axes, law)
+    else:
+        _draw_curve(axes, law, name)
 
 
 def local_laws(verdict: Verdict) -> tuple[Invented, ...]:
