@@ -34,8 +34,9 @@ def effect_of(effect, end, share):
 
 
 def size_of(p, end):
-    """Return a parameter's neutral value and its bound, both finite."""
-    neutral, bound = EV3.nominal(p), getattr(p, end)
+    """Return a parameter's neutral value and its bound in this robot, both finite."""
+    lowest, highest = EV3.bounds(p)
+    neutral, bound = EV3.nominal(p), min(max(getattr(p, end), lowest), highest)
     return tuple(value if math.isfinite(value) else p.start for value in (neutral, bound))
 
 
