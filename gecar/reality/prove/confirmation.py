@@ -58,7 +58,9 @@ def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
     if not refused or problem.on_bench:
         return first
     problem.tell(f"once more without {', '.join(sorted(refused))}")
-    again = confirmed(explain(replace(problem, refused=refused)), held)
+    # Clocks that were fitted on the way are those of the recordings, whatever moves the robot.
+    begun = first.explained.problem if first.explained.problem.clocks_fitted else problem
+    again = confirmed(explain(replace(begun, refused=refused)), held)
     if len(again.explained.steps) <= len(first.explained.steps):
         return first
     return replace(again, candidates=(*first.candidates, *again.candidates))
