@@ -43,6 +43,7 @@ from gecar.reality.selection.thresholds import (
 from gecar.world.effects import BY_ID
 
 BEGINNINGS = 3  # effects of the first stage a chain may begin with
+CONTINUED = 2  # times that the chain of a bench goes on
 RIVALS = 4  # effects of a stage that are tried in the place of one that was taken
 
 
@@ -106,18 +107,25 @@ def explain(problem: Problem) -> Explanation:
 
 
 def _explain_motor(problem: Problem, first: Sequence[Step]) -> Explanation:
-    """Explain a motor on a bench: its own constants before anything else, chosen anew beside what is found."""
+    """Explain a motor on a bench: its own constants before anything else, chosen anew beside what is found.
+
+    What takes another's place may let more come forward: then the chain goes on.
+    """
     model = with_constants(problem, problem.known)
-    begun = _Chain(_steps(problem, model), model, (tuple(first),))
-    chain = _forward(problem, begun, candidate_steps(problem, model))
-    model = with_constants(problem, chain.model)
-    constants = [effect for effect in model.effects if effect in CONSTANTS]
-    found = replace(chain, steps=tuple(s for s in chain.steps if s.effect not in CONSTANTS), model=model)
-    model, kept = _swapped_and_dropped(problem, found, chain.tried, constants)
-    model = with_constants(problem, model)
-    stages = {step.effect: step.stage for step in kept}
-    steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, model)]
-    return concluded(problem, model, steps, chain.tried)
+    chain = _Chain(_steps(problem, model), model, (tuple(first),))
+    for _ in range(CONTINUED):
+        chain = _forward(problem, chain, candidate_steps(problem, chain.model))
+        model = with_constants(problem, chain.model)
+        constants = [effect for effect in model.effects if effect in CONSTANTS]
+        found = replace(chain, steps=tuple(s for s in chain.steps if s.effect not in CONSTANTS), model=model)
+        model, kept = _swapped_and_dropped(problem, found, chain.tried, constants)
+        model = with_constants(problem, model)
+        stages = {step.effect: step.stage for step in kept}
+        steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, model)]
+        chain = replace(chain, steps=tuple(steps), model=model)
+        if {step.effect for step in found.steps} == {step.effect for step in kept}:
+            break
+    return concluded(problem, model, chain.steps, chain.tried)
 
 
 def _steps(problem: Problem, model: Model) -> tuple[Step, ...]:
