@@ -15,12 +15,16 @@ def main() -> None:
     """Run the command line; exit code 0, 2 for a bad input, 130 for Ctrl-C, 1 for a fault of gecar's own."""
     _print_anywhere()
     try:
-        from gecar.parallel.signals import remember_interrupts  # noqa: PLC0415  an interrupt now is caught, too
+        from gecar.parallel.signals import (  # noqa: PLC0415  an interrupt now is caught, too
+            interrupts_told,
+            remember_interrupts,
+        )
 
         remember_interrupts()
         from gecar.cli.application import application  # noqa: PLC0415
 
-        application()()
+        with interrupts_told():
+            application()()
     except InputError as error:
         _end(f"error: {error}", 2)
     except KeyboardInterrupt:

@@ -16,7 +16,7 @@ import pytest
 from test_results import SHORT, outputs
 
 from gecar.errors import InputError
-from gecar.parallel.signals import raise_if_interrupted, remember_interrupts
+from gecar.parallel.signals import interrupts_told, raise_if_interrupted, remember_interrupts
 from gecar.results.config import configure
 from gecar.results.run import finish, resume, start
 
@@ -119,6 +119,13 @@ def test_damage_is_refused_in_one_line_or_changes_nothing(name, damage, whole, t
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_what_compiled_code_makes_of_an_interrupt_is_an_interrupt_again() -> None:
+    with pytest.raises(KeyboardInterrupt), interrupts_told():
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+    with pytest.raises(SystemError), interrupts_told():
+        raise SystemError("something else")
+
+
 def test_an_interrupt_that_something_dropped_is_raised_at_the_next_turn() -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

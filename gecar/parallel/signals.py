@@ -36,6 +36,20 @@ def raise_if_interrupted() -> None:
 
 
 @contextmanager
+def interrupts_told() -> Iterator[None]:
+    """Raise `KeyboardInterrupt` where compiled code made something else of a Ctrl-C.
+
+    A Ctrl-C that comes while Numba takes arguments apart is a result with an exception set to Python: SystemError.
+    """
+    try:
+        yield
+    except SystemError as error:
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        raise KeyboardInterrupt from error
+
+
+@contextmanager
 def sigint_ignored() -> Iterator[None]:
     """Let processes started within never hear of Ctrl-C; this one hears of it afterwards, since it has to answer."""
     if sys.platform == "win32":

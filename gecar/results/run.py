@@ -26,7 +26,7 @@ from gecar.language.opcodes import MAX_DUTY_PCT
 from gecar.language.program import Program, parse_program
 from gecar.language.robot_language import check_robot_language
 from gecar.parallel.executors import open_executor, side_by_side
-from gecar.parallel.signals import raise_if_interrupted
+from gecar.parallel.signals import interrupts_told, raise_if_interrupted
 from gecar.results.arrival import arrives
 from gecar.results.autosave import Saver
 from gecar.results.config import Config, as_toml, configure, difference, identify, merged, read_config
@@ -258,19 +258,20 @@ def finish(started: Started, after: Callable[[Generation], None] = lambda genera
         raise_if_interrupted()
 
     try:
-        if not evolution.finished:
-            search(task, evolution, saved)
-        saver.save()
-        choose(task, evolution)
-        # Who came from whom is asked of the program chosen.
-        folder.save(evolution.state(), task.configuration)
-        folder.write_reports(evolution)
-        more = (
-            measured(task, evolution)
-            | _generalisation(task, evolution, folder)
-            | _front(task, evolution, folder)
-        )
-        return folder.write_result(evolution, more)
+        with interrupts_told():
+            if not evolution.finished:
+                search(task, evolution, saved)
+            saver.save()
+            choose(task, evolution)
+            # Who came from whom is asked of the program chosen.
+            folder.save(evolution.state(), task.configuration)
+            folder.write_reports(evolution)
+            more = (
+                measured(task, evolution)
+                | _generalisation(task, evolution, folder)
+                | _front(task, evolution, folder)
+            )
+            return folder.write_result(evolution, more)
     except KeyboardInterrupt:
         saver.leave()
         raise
