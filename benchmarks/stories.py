@@ -6,12 +6,12 @@ and with the law; right, how far the simulations are off, and the law's curve.
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from benchmarks.concealed.plan import read_label
 from benchmarks.invention import judged
 from gecar.plots.reality.law import draw_law
 from gecar.plots.style import BLUE, INK, SOFT, VERMILION, headline, look, new_figure, save
@@ -59,8 +59,7 @@ def main() -> None:
     parser.add_argument("name", help="of the case")
     parser.add_argument("--out", type=Path, required=True, help="PNG, PDF or SVG")
     given = parser.parse_args()
-    label = json.loads((given.cases / "sealed" / given.name / "label.json").read_text())
-    verdict = judged(given.cases / "cases" / given.name, label)
+    verdict = judged(given.cases / "cases" / given.name, read_label(given.cases, given.name))
     if not verdict.invented:
         raise SystemExit(f"{given.name}: found no law, expected one to draw")
     save(story_figure(verdict), given.out)

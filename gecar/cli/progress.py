@@ -16,11 +16,11 @@ from gecar.evolution.history import Generation, pace
 from gecar.evolution.scores import UNSOLVED
 
 PLAIN_EVERY_S = 15.0
-"""How often a plain line is said at most [s]."""
+"""Shortest time between two lines of progress where there is no terminal [s]."""
 
 
 class _LiveLine:
-    """A line on a terminal that is shown inside a ``with`` block; ``live`` is None elsewhere."""
+    """A line of progress, shown inside a ``with`` block; ``live`` is None where there is no terminal."""
 
     live: Progress | None
 
@@ -111,7 +111,7 @@ class Steps(_LiveLine):
             self.say(step)
 
     def ended(self, done: int, of: int) -> None:
-        """Count cases that have ended, and say from then on how long the others take if they are alike."""
+        """Take the number of cases that have ended; the line then shows how long the others take at the same pace."""
         left_s = (time.monotonic() - self._begun) * (of - done) / done
         self._ahead = f"{done} of {of}, {_minutes(left_s)} left  "
         if self.live:

@@ -127,7 +127,7 @@ class FitnessProblem(Problem[P]):
         return derivation.text.encode()
 
     def seed(self, program: P, digest: bytes, seed: int) -> int:
-        """Return the seed of a program's noise; 0 where the function has no part for chance."""
+        """Return the seed of a program's noise; 0 if its score does not depend on chance."""
         chance = self.fitness.function is None or self.rescored
         return super().seed(program, digest, seed) if chance else 0
 

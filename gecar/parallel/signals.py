@@ -37,9 +37,9 @@ def raise_if_interrupted() -> None:
 
 @contextmanager
 def interrupts_told() -> Iterator[None]:
-    """Raise `KeyboardInterrupt` where compiled code made something else of a Ctrl-C.
+    """Raise `KeyboardInterrupt` for a Ctrl-C that compiled code turned into a `SystemError`.
 
-    A Ctrl-C that comes while Numba takes arguments apart is a result with an exception set to Python: SystemError.
+    Numba does when it is interrupted while it reads its arguments: it returns a result and leaves the exception set.
     """
     try:
         yield

@@ -108,7 +108,7 @@ def settle(figure: Figure) -> None:
 
 
 def picture_kind(path: Path, option: str = "picture") -> str:
-    """Return the kind of picture a name's ending asks for; ``option`` is what an error names.
+    """Return the format that a file name's ending asks for; an error names ``option``.
 
     Raises
     ------

@@ -30,7 +30,7 @@ from gecar.world.effects import Effect
 from gecar.world.robot import Robot, write_robot
 
 USUAL = 0.6
-"""Seconds of one processor in which nine of ten cases are done, a second of recordings (docs/discover.md)."""
+"""Processor time per second of recording within which nine of ten cases are done [s] (docs/discover.md)."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def conclude_away(task: Task, tell: Callable[[str], None] = keep_still) -> Told:
 
 
 def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers: int, scheduler: str) -> None:
-    """Conclude cases side by side, write each as it ends and say it in a line, and name those that failed.
+    """Conclude cases side by side; write each when it ends, print its result in one line, and name those that failed.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def conclude_all(output: Output, tasks: Mapping[Path, Task], kind: str, workers:
 
 
 def usual_s(case: Case) -> float:
-    """Return by when nine of ten cases like this one are done [s]."""
+    """Return the processor time within which nine of ten cases of this length are done [s]."""
     return USUAL * sum(float(run.t_s[-1] - run.t_s[0]) for run in case.recordings)
 
 
@@ -185,7 +185,7 @@ def say(output: Output, told: Told, out: Path) -> None:
 
 
 def _written(output: Output, out: Path, told: Told, *, brief: bool) -> dict[str, Any]:
-    """Write what was made elsewhere and say it, in a line where brief; return the JSON object."""
+    """Write files that were made elsewhere and print the result, in one line if brief; return the JSON object."""
     out.mkdir(parents=True, exist_ok=True)
     for name, content in told.files.items():
         write_whole(out / name, content)

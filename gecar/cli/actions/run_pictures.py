@@ -216,7 +216,7 @@ def _shares_in(task: Task, ancestry: Ancestry) -> Callable[[Member], float | Non
 
 
 def film_run(folder: Path, target: Path) -> Path:
-    """Film how a run came to its best program, in half a minute at most: from the first best so far to the one chosen.
+    """Film how a run found its program, in half a minute at most: programs that were best so far, then the one chosen.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def film_run(folder: Path, target: Path) -> Path:
 
 
 def _champions(ancestry: Ancestry, world: World, settings: dict[str, Any]) -> list[Champion]:
-    """Drive the programs that a film shows as the run scored them: each the best so far, and at the end the run's."""
+    """Drive the programs that a film shows, as the run scored them: those best so far, then the one chosen."""
     winner = ancestry.winner  # later ones looked faster, and arrive less often
     ways = [member for member in ancestry.lineage.champions() if member[0] < winner[0]]
     members = [(member[0], ancestry.program(member)) for member in (*ways, winner)]

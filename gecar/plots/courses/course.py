@@ -208,7 +208,7 @@ def _draw_things(axes: Axes, course: Course) -> None:
 
 
 def colour_of(obstacle: Obstacle) -> str:
-    """Return the colour an obstacle is drawn in: pale ones can be pushed."""
+    """Return the colour of an obstacle: pale if it can be pushed."""
     return PALE if obstacle.movable else FIXED
 
 

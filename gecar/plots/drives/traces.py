@@ -53,7 +53,7 @@ def _pair(
     right: npt.NDArray[np.float64],
     drawn: str = "default",
 ) -> None:
-    """Draw both sides without hue: hues are of the program's lines."""
+    """Draw both sides in black and grey: colours stand for the program's lines."""
     axes.plot(t, left, color=INK, linewidth=1.2, drawstyle=drawn, label="left")
     axes.plot(t, right, color=PALE, linewidth=1.2, drawstyle=drawn, label="right")
 

@@ -1,4 +1,4 @@
-"""Invented laws as curves with 95 % bands, grey where no recording went; and on the floor, along the ways driven."""
+"""Invented laws: as curves with 95 % bands, grey where there is no data, and as maps along the paths driven."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def draw_law(axes: Axes, law: Invented) -> None:
 
 
 def local_laws(verdict: Verdict) -> tuple[Invented, ...]:
-    """Return the laws that depend on the place."""
+    """Return the laws that depend on the robot's position."""
     return tuple(law for law in verdict.invented if not _OF_PLACE.isdisjoint(law.term.parsed.variables))
 
 
 def laws_map_figure(verdict: Verdict) -> Figure:
-    """Draw what every law that depends on the place gives along the ways driven in the recordings fitted on."""
+    """Draw the value of every law that depends on the position, along the paths of the recordings fitted on."""
     laws, setup = local_laws(verdict), verdict.evidence.fitted.recordings[0].recording.setup
     figure = new_figure(9.0, 0.8 + MAP_IN * len(laws))
     figure.set_layout_engine("compressed")
@@ -96,7 +96,7 @@ def laws_map_figure(verdict: Verdict) -> Figure:
 
 
 def along_ways(verdict: Verdict, law: Invented) -> list[Array]:
-    """Return time [s], place [m, m] and what a law gives there in the port's unit, shape (rows, 4) a recording.
+    """Return time [s], position [m, m] and the law's value [the port's unit], shape (rows, 4), for each recording.
 
     As the robot with the laws has them; of a law of each wheel the mean of both.
     """

@@ -112,7 +112,7 @@ def _start(run: RecordingResiduals) -> str:
 
 
 def battery_at_its_end(robot: Robot) -> list[str]:
-    """Return a note where the battery's voltage is as low or high as the robot's file allows, if it says."""
+    """Return a note if the fitted battery voltage lies at an end of the range in the robot's file."""
     battery = robot.battery
     voltage = battery.voltage * robot.effects.get("supply_voltage", {}).get("scale", 1.0)
     ends = {"voltage_low": battery.voltage_low, "voltage_high": battery.voltage_high}

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.discrepancy import Discrepancy
-from gecar.reality.fitting.model import Effects, Model
+from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
@@ -120,6 +120,10 @@ class Estimator:
     def at(self, model: Model, z: Array) -> Model:
         """Return a model at other coordinates."""
         return self._model(model.effects, z)
+
+    def models_of(self, step: Step) -> tuple[Model, Model]:
+        """Return a step's models, without its effect and with it, with their residuals under this discrepancy."""
+        return self.at(step.base, step.base.z), self.at(step.model, step.model.z)
 
     def searched(self, model: Model, spread: float = REFINED_SPREAD) -> Model:
         """Search about a fit without derivatives; return the better one."""

@@ -162,7 +162,7 @@ def free(robot: Robot, effect_ids: Sequence[str]) -> Parameters:
 
 
 def bounded(robot: Robot, parameter: Parameter) -> Parameter:
-    """Return a parameter with the bounds this robot sets: its body, its battery."""
+    """Return a parameter with the bounds that this robot's body and battery set."""
     low, high = robot.bounds(parameter)
     return parameter if math.isinf(high) else replace(parameter, low=low, high=high)
 

@@ -169,6 +169,6 @@ def size_of(problem: Problem, model: Model, step: Step) -> Size:
 
 
 def steady(problem: Problem, step: Step) -> bool:
-    """Whether an effect has one size in all recordings: imitations have not; the problem is under what is left."""
-    without, with_effect = (problem.estimator.at(each, each.z).errors for each in (step.base, step.model))
-    return spread_of_size(problem.estimator.blocks.folds, without, with_effect) < STEADY
+    """Whether an effect has the same size in all recordings; ``problem`` is under the discrepancy its model leaves."""
+    without, with_effect = problem.estimator.models_of(step)
+    return spread_of_size(problem.estimator.blocks.folds, without.errors, with_effect.errors) < STEADY

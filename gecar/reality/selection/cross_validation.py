@@ -27,16 +27,15 @@ REFITS = 3  # iterations of a fit without a fold, which begins close to its end
 
 
 def judged(problem: Problem, step: Step) -> Step:
-    """Return a step with its gain on left-out recordings, and with what the null distribution says of that.
+    """Return a step with its gain on left-out recordings, and its p-value by the null distribution.
 
     Small changes of all parameters but its own are noise here. Its own would hide what recordings have in common, the
     more the stronger an effect is, and leave the little that they differ by.
     """
     estimator = problem.under(step.model).estimator
-    base, model = (estimator.at(each, each.z) for each in (step.base, step.model))
-    gains = left_out_gains(
-        estimator, replace(step, base=base, model=model, gain=base.cost - model.cost), problem.on_bench
-    )
+    base, model = estimator.models_of(step)
+    alone = replace(step, base=base, model=model, gain=base.cost - model.cost)
+    gains = left_out_gains(estimator, alone, problem.on_bench)
     nulls = largest_gains(estimator, problem.catalogue, model)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)

@@ -54,11 +54,11 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     Parameters
     ----------
     problem
-        Under what the model leaves, so that no small change of the effect itself is noise.
+        Under the discrepancy the model leaves, so that no small change of the effect itself is noise.
     model, step
         The model, and the step that took the effect.
     """
-    unknown = tuple(problem.estimator.at(each, each.z).errors for each in (step.base, step.model))
+    unknown = tuple(model.errors for model in problem.estimator.models_of(step))
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni

@@ -142,8 +142,9 @@ def concluded(
     tried: Sequence[tuple[Step, ...]],
     drifting: tuple[Step, ...] = (),
 ) -> Explanation:
-    """Judge what effects leave, and which of them are material; ``drifting`` are those known to have no one size."""
+    """Keep the effects that are findings, and judge what they leave; ``drifting`` are known to differ in size."""
     problem = problem.under(model)
+    before = problem.material.times(problem.sizes.left(problem.known.physics, repeatedly=True))
     while True:
         weakest = _weakest_drifting(problem, model, steps)
         if weakest is not None:
@@ -151,21 +152,32 @@ def concluded(
             drifting = (*drifting, replace(weakest, drifts=True))
         else:
             left = _left(problem, model)
-            kept = _standing_beside(problem, model, steps, left)
+            kept = _standing_beside(problem, model, steps, problem.material.times(left), before)
         if len(kept) == len(steps):
-            return _by_size(problem, model, steps, left, tried, drifting)
+            break
         model = _fitted_anew(problem, model, kept)
         problem = problem.under(model)
         steps = kept if weakest is None else [_beside_others(problem, model, step) for step in kept]
+    minor = tuple(step for step in steps if not is_material(problem, model, step))
+    named, whole = tuple(step for step in steps if step not in minor), model
+    if minor:  # what carries no claim bends no other effect's size
+        problem = problem.under(model, [step.effect for step in named])
+        model = problem.estimator.fit([step.effect for step in named], model.values)
+        # What they explain is left, unless small changes of what is known explain it as well.
+        left = _left(problem, model)
+    much = _is_much(model, problem.material.times(left), before)
+    return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
-def _standing_beside(problem: Problem, model: Model, steps: Sequence[Step], left: Size) -> list[Step]:
-    """Return the effects that stand beside what they leave: all, unless that is material.
+def _standing_beside(
+    problem: Problem, model: Model, steps: Sequence[Step], now: float, before: float
+) -> list[Step]:
+    """Return the effects that may be named beside what they leave: all, unless that is material.
 
-    Then smaller ones than the catalogue's size do not: they may be part of what is left. Where they leave much of it,
+    Then effects below the catalogue's size may not: they may be part of what is left. Where they leave much of it,
     others must have one size in all recordings to a few percent, and explain a good part of what is left without them.
+    ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
-    now, before = _times(problem, left)
     if not _is_much(model, now, before):
         return list(steps)
     hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
@@ -175,32 +187,6 @@ def _standing_beside(problem: Problem, model: Model, steps: Sequence[Step], left
         if (problem.on_bench or is_worthwhile(model, step.effect))
         and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
     ]
-
-
-def _by_size(
-    problem: Problem,
-    model: Model,
-    steps: Sequence[Step],
-    left: Size,
-    tried: Sequence[tuple[Step, ...]],
-    drifting: tuple[Step, ...],
-) -> Explanation:
-    """Return the explanation whose effects are those that are material, the others fitted no more."""
-    minor = tuple(step for step in steps if not is_material(problem, model, step))
-    named, whole = tuple(step for step in steps if step not in minor), model
-    if minor:  # what carries no claim bends no other effect's size
-        problem = problem.under(model, [step.effect for step in named])
-        model = problem.estimator.fit([step.effect for step in named], model.values)
-        # What they explain is left, unless small changes of what is known explain it as well.
-        left = _left(problem, model)
-    much = _is_much(model, *_times(problem, left))
-    return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
-
-
-def _times(problem: Problem, left: Size) -> tuple[float, float]:
-    """Return how many times the line of what is material is left, and was before anything was fitted."""
-    initial = problem.sizes.left(problem.known.physics, repeatedly=True)
-    return problem.material.times(left), problem.material.times(initial)
 
 
 def _left(problem: Problem, model: Model) -> Size:
