@@ -16,7 +16,7 @@ from gecar.language.program import parse_program
 from gecar.plots.runs.compare_runs import compare_runs
 from gecar.plots.runs.convergence import Reference, convergence
 from gecar.plots.runs.study_table import convergences, heat_map
-from gecar.plots.style import is_whole, settle
+from gecar.plots.style import is_whole
 from gecar.reality.calibrate.constants import with_constants
 from gecar.report.drive import title_of
 from gecar.report.runs import run_title
@@ -214,11 +214,7 @@ def test_a_convergence_is_labelled_with_the_winner_and_not_with_what_looked_best
     winner = Reference("98.5 % arrive", 18.05)
     figure = convergence(history(30.0, 17.15), references, "A title", "a detail", winner)
     assert is_whole(figure)
-    texts = {text.get_text(): text for text in figure.axes[0].texts}
-    assert "18.05 s\n98.5 % arrive" in texts
-    settle(figure)
-    curve = figure.axes[0].transData.transform((0.0, 17.15))[1]
-    assert texts["the paper's best, 16.74 s"].get_window_extent().y1 < curve
+    assert "18.05 s\n98.5 % arrive" in [text.get_text() for text in figure.axes[0].texts]
 
 
 def test_runs_beside_each_other_say_what_they_came_to():

@@ -55,6 +55,13 @@ def draw_course(axes: Axes, course: Course, marks: bool = True) -> None:
     _set_frame(axes, course)
 
 
+def show_whole(axes: Axes, path: npt.NDArray[np.float64], margin_m: float = 0.03) -> None:
+    """Widen a picture until a path is in it, which may leave the course: x and y [m], shape (samples, 2 or more)."""
+    for k, (ends, widen) in enumerate(((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim))):
+        low, high = np.nanmin(path[:, k]) - margin_m, np.nanmax(path[:, k]) + margin_m
+        widen(min(ends[0], low), max(ends[1], high))
+
+
 def course_figure(course: Course, robot: Robot | None = None) -> Figure:
     """Draw a course by itself, with the robot at START and the shortest way where a robot is given."""
     width = 9.0

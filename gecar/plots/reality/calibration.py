@@ -10,7 +10,6 @@ from matplotlib.ticker import FuncFormatter
 from gecar.plots.style import (
     BLUE,
     FAINT,
-    GREEN,
     INK,
     LIGHT,
     SOFT,
@@ -88,7 +87,7 @@ def _misfits(axes: Axes, result: Calibration) -> None:
             axes.axhspan(row - 0.5, row + 0.5, color=LIGHT, zorder=0, linewidth=0)
         axes.plot([before, after], [row, row], color=FAINT, linewidth=3.0, zorder=1)
         axes.plot(before, row, "o", color=VERMILION, markersize=5, label="before" if row == 0 else None)
-        axes.plot(after, row, "o", color=GREEN, markersize=5, label="after" if row == 0 else None)
+        axes.plot(after, row, "o", color=BLUE, markersize=5, label="after" if row == 0 else None)
     axes.set_xscale("log")
     log_ticks(axes.xaxis)
     axes.set_xlabel("NRMSE of angles and pose   (yellow: held out)")

@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from gecar.plots.courses.course import draw_course
+from gecar.plots.courses.course import draw_course, show_whole
 from gecar.plots.reality.law import along_ways, laws_figure, laws_map_figure, local_laws
 from gecar.plots.style import (
     BLUE,
@@ -154,8 +154,11 @@ def _in_units(column: str, misfit: Misfit) -> str:
 def regimes_figure(verdict: Verdict) -> Figure:
     """Draw how densely mismatch lies in each regime of motion, by channel: 1 is the average."""
     where = verdict.evidence.where
-    rows = [k for k in range(len(CHANNELS)) if (where.samples[k] > 0).any()]
-    density = np.array([[_density(where, k, mask) for mask in where.masks.values()] for k in rows])
+    every = np.array(
+        [[_density(where, k, mask) for mask in where.masks.values()] for k in range(len(CHANNELS))]
+    )
+    rows = np.flatnonzero(~np.isnan(every).all(axis=1))
+    density = every[rows]
     telling = np.argsort(-np.nan_to_num(np.log(np.maximum(density, 0.01))).max(axis=0))[:SHOWN_REGIMES]
     names = [list(where.masks)[k] for k in telling]
     figure = new_figure(8.6, 2.0 + 0.4 * len(rows))
@@ -284,6 +287,7 @@ def map_figure(verdict: Verdict) -> Figure:
             lines.set_array(np.sqrt(np.clip(loud[seen][:-1], 0, top)))
             lines.set_clim(0.0, np.sqrt(top))
             axes.add_collection(lines)
+            show_whole(axes, points)
         for place in verdict.located:
             if place.place is not None:
                 x, y, radius = place.place

@@ -43,7 +43,7 @@ def compare_runs(
         figure = new_figure(9.0, 6.4)
         headline(figure, title, detail)
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
-        draw_references(top, references, side=0.0)
+        draw_references(top, references)
         for k, (name, histories) in enumerate(groups.items()):
             words = name if len(histories) == 1 else f"{name}, {len(histories)} runs"
             words = ": ".join(filter(None, [words, came_to.get(name)]))

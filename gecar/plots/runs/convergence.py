@@ -17,17 +17,14 @@ from gecar.plots.style import (
     GREEN,
     INK,
     ORANGE,
-    PAPER,
     PURPLE,
     SKY,
     SOFT,
-    VERMILION,
     headline,
     look,
     new_figure,
 )
 
-_VEIL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
 UNSOLVED = 1e4
 """Fitness of a program that does not reach GOAL, eq. 1."""
 
@@ -74,7 +71,7 @@ def convergence(
             top.plot(
                 generation, history["mean_solved"], color=ORANGE, linewidth=1.2, label="mean of those at GOAL"
             )
-        if (best < UNSOLVED).any():
+        if top.get_legend_handles_labels()[0]:
             top.legend(loc="upper right")
         _draw_shares(bottom, history)
         bottom.set_xlabel("generation")
@@ -93,7 +90,7 @@ def draw_best(
     """Draw the best time of each generation; generations in which no program reaches GOAL are shaded."""
     solved = best < UNSOLVED
     times = np.where(solved, best, np.nan)
-    draw_references(axes, references, clear_of_s=times[-1])
+    draw_references(axes, references)
     axes.step(generation, times, where="post", color=BLUE, linewidth=2.2, zorder=3, label="best")
     axes.plot(generation[solved], best[solved], "o", color=BLUE, markersize=3, zorder=3)
     axes.set_ylabel("best time to GOAL [s]")
@@ -161,37 +158,12 @@ def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
     )
 
 
-def draw_references(
-    axes: Axes, references: Sequence[Reference], side: float = 1.0, clear_of_s: float = -np.inf
-) -> None:
-    """Draw times to compare with across a picture of times.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    references
-        What.
-    side
-        End of the lines that their words stand at: left (0) or right (1).
-    clear_of_s
-        A time that is drawn at that end [s]: words stand above lines, but below those that are below it.
-    """
-    for colour, reference in zip((VERMILION, INK, SOFT), references, strict=False):
-        below = reference.time_s <= clear_of_s
-        axes.axhline(reference.time_s, color=colour, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
-        axes.annotate(
-            f"{reference.words}, {reference.time_s:.2f} s",
-            (side, reference.time_s),
-            (4 - 8 * side, -5 if below else 5),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="right" if side else "left",
-            size=8,
-            color=colour,
-            va="top" if below else "baseline",
-            bbox=_VEIL,
-        )
+def draw_references(axes: Axes, references: Sequence[Reference]) -> None:
+    """Draw times to compare with across a picture of times; its legend names them."""
+    dashes = ((0, (5, 3)), (0, (1, 2)), (0, (5, 2, 1, 2)))
+    for dash, reference in zip(dashes, references, strict=False):
+        words = f"{reference.words}, {reference.time_s:.2f} s"
+        axes.axhline(reference.time_s, color=INK, linewidth=1.2, linestyle=dash, zorder=2, label=words)
 
 
 def _frame(axes: Axes, times: Sequence[float], references: Sequence[Reference]) -> None:

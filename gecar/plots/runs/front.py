@@ -68,9 +68,10 @@ def _panel(axes: Axes, values: Floats, on_front: npt.NDArray[np.bool_], whole: b
 def _number(axes: Axes, places: Floats, numbers: npt.NDArray[np.intp]) -> None:
     """Write programs' numbers beside their points, but for those on top of one another."""
     spans = np.maximum(np.ptp(places, axis=0), 1e-9) if len(places) else np.ones(2)
+    room = spans * (0.08, 0.035)  # a number is wider than it is high
     written: list[Floats] = []
     for place, number in zip(places, numbers.tolist(), strict=True):
-        if all(np.abs((place - other) / spans).max() > 0.035 for other in written):
+        if all(np.abs((place - other) / room).max() > 1.0 for other in written):
             axes.annotate(f"{number}", place, (4, 4), textcoords="offset points", size=7, color=INK)
             written.append(place)
 
