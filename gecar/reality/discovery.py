@@ -341,6 +341,7 @@ def _explain_sensor(
     known = motion.taken.parameters.robot.with_effects(motion.taken.values)
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
     problem = _problem(context, known, residuals, beside)
+    problem = replace(problem, sizes=replace(problem.sizes, off=motion.left))
     seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     seen = with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), beside)

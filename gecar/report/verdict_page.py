@@ -251,6 +251,10 @@ def _bars(choice: Choice, alone: bool) -> str:
             "<p class='soft'>At the end of these recordings it does not help; "
             "it was chosen for what it gains earlier.</p>"
         )
+    elif winner and any(rival.left < winner.left for rival in choice.telling):
+        parts.append(
+            "<p class='soft'>A shorter bar gained less where it was fitted, or not as much in each recording.</p>"
+        )
     faint = [rival for rival in choice.rivals if rival not in choice.telling]
     if faint:
         best = min(faint, key=lambda rival: rival.left)

@@ -57,9 +57,9 @@ def draw_course(axes: Axes, course: Course, marks: bool = True) -> None:
 
 def show_whole(axes: Axes, path: npt.NDArray[np.float64], margin_m: float = 0.03) -> None:
     """Widen a picture until a path is in it, which may leave the course: x and y [m], shape (samples, 2 or more)."""
-    for k, (ends, widen) in enumerate(((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim))):
-        low, high = np.nanmin(path[:, k]) - margin_m, np.nanmax(path[:, k]) + margin_m
-        widen(min(ends[0], low), max(ends[1], high))
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    (x, y), (last_x, last_y) = np.nanmin(path, axis=0)[:2] - margin_m, np.nanmax(path, axis=0)[:2] + margin_m
+    axes.set(xlim=(min(left, x), max(right, last_x)), ylim=(min(bottom, y), max(top, last_y)))
 
 
 def course_figure(course: Course, robot: Robot | None = None) -> Figure:

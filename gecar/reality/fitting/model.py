@@ -53,6 +53,11 @@ class Model:
         return self.minimum.z
 
     @property
+    def key(self) -> tuple[tuple[str, ...], bytes]:
+        """What it is told from other models by."""
+        return self.effects, self.minimum.z.tobytes()
+
+    @property
     def errors(self) -> Array:
         """Whitened residuals, shape (n,)."""
         return self.minimum.errors

@@ -32,7 +32,7 @@ from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import share_asked_for, spread_of_size
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CLOSE, DRIFTING, MEASURED, PRICE
+from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE, SEVERAL
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
 from gecar.world.ports import N_TERMS, PORTS, TOWARD_A_POINT
@@ -225,7 +225,8 @@ def _explained_with(
     robot = problem.estimator.robot
     robot = robot.with_terms([*robot.term, *terms])
     estimator = Estimator(problem.residuals, robot, problem.estimator.rng)
-    problem = replace(problem, estimator=estimator.under(under.estimator.discrepancy if under else None))
+    others = under.estimator.discrepancy if under else None
+    problem = replace(problem, estimator=estimator.under(others), kept={})
     parameters = free(robot, effects)
     bare = replace(first.taken, effects=tuple(effects), parameters=parameters)
     model: Model = problem.estimator.at(bare, parameters.vector(values))
@@ -242,7 +243,7 @@ def _explained_with(
         minor=(),
         whole=model,
         left=left,
-        unexplained=now > MEASURED and now / max(was, 1.0) > LAWS_LEAVE,
+        unexplained=now > SEVERAL and now / max(was, 1.0) > LAWS_LEAVE,
     )
 
 

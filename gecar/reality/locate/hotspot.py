@@ -11,7 +11,7 @@ from gecar.reality.fitting.model import Model
 from gecar.reality.replay.kernel import X, Y
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import HOTSPOT, MEASURED
+from gecar.reality.selection.thresholds import HOTSPOT, SEVERAL
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def with_spot(explained: Explanation) -> Explanation:
     if spot is None:
         return explained
     left = problem.sizes.left_about(problem.with_small_changes(model), spot)
-    material = problem.material.times(left) > MEASURED
+    material = problem.material.times(left) > SEVERAL
     if not (material or explained.unexplained):
         return explained
     return replace(explained, unexplained=True, spot=spot)

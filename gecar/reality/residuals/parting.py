@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,7 @@ class _Noise(NamedTuple):
 
 
 QUIET = _Noise(0.0, 0.0)
+NOTHING = Size()
 PATH_KNOWN = np.array(
     [0.003, 0.003, 0.01]
 )  # to which a camera, its lens and its mount tell a path [m, m, rad]
@@ -56,15 +57,18 @@ class Sizes:
         Whether the colour sensor counts, or else the motion.
     beside
         More recordings, of which only the commands count: how far two robots part under them.
+    off
+        How far the path that the sensor took may be off, over one metre: as far as nothing explains the motion.
     """
 
     runs: tuple[RecordingResiduals, ...]
     sensor: bool
     beside: tuple[RecordingResiduals, ...] = ()
+    off: Size = NOTHING
 
     def of(self, residuals: Residuals) -> Sizes:
         """Return the sizes under the commands of other recordings."""
-        return Sizes(residuals.recordings, residuals.sensor, self.beside)
+        return replace(self, runs=residuals.recordings, sensor=residuals.sensor)
 
     def apart(self, one: Physics, other: Physics) -> Size:
         """Return how far two robots part, in the recording where that is most; physics records of shape (1,)."""
@@ -82,10 +86,10 @@ class Sizes:
         Or as far as it repeatedly does: in one of four, and in more than one if there are more. Where a motor hardly
         overcomes friction, nothing is known well: one such recording shall not decide.
         """
-        of = _reading_left if self.sensor else _left
-        return combined(
-            [of(run, physics) for run in self.runs], _repeated if repeatedly else statistics.median
-        )
+        sizes = [
+            _reading_left(run, physics, self.off) if self.sensor else _left(run, physics) for run in self.runs
+        ]
+        return combined(sizes, _repeated if repeatedly else statistics.median)
 
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
@@ -161,9 +165,10 @@ def _reading_apart(run: RecordingResiduals, one: Physics, others: Sequence[Physi
     return [Size(reading_pct=_root_mean((readings - run.readings(other)) ** 2)) for other in others]
 
 
-def _reading_left(run: RecordingResiduals, physics: Physics) -> Size:
+def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:
     errors = run.recording.reflection_pct - run.readings(physics)
-    return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, PATH_KNOWN) ** 2))
+    path_sd = np.hypot(PATH_KNOWN, (1e-3 * off.mm_1m, 1e-3 * off.mm_1m, math.radians(off.deg_1m)))
+    return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, path_sd) ** 2))
 
 
 def _replayed(run: RecordingResiduals, physics: Physics) -> Prediction:

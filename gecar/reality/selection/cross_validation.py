@@ -32,13 +32,21 @@ def judged(problem: Problem, step: Step) -> Step:
     Small changes of all parameters but its own are noise here. Its own would hide what recordings have in common, the
     more the stronger an effect is, and leave the little that they differ by.
     """
+    left_out, null_95, p = problem.once(
+        "judged", step.base.key, step.model.key, make=lambda: _judged(problem, step)
+    )
+    return replace(step, left_out=left_out, null_95=null_95, p=p)
+
+
+def _judged(problem: Problem, step: Step) -> tuple[Array, float, float]:
+    """Return what a step gains on left-out recordings, the 95 % quantile of nulls, and the p-value."""
     estimator = problem.under(step.model).estimator
     base, model = estimator.models_of(step)
     alone = replace(step, base=base, model=model, gain=base.cost - model.cost)
     gains = left_out_gains(estimator, alone, problem.on_bench)
     nulls = largest_gains(estimator, problem.catalogue, model)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
-    return replace(step, left_out=gains, null_95=float(np.quantile(nulls, 0.95)), p=p)
+    return gains, float(np.quantile(nulls, 0.95)), p
 
 
 def left_out_gains(estimator: Estimator, step: Step, refits: bool = False) -> Array:

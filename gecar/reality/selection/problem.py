@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
-from gecar.reality.fitting.discrepancy import discrepancy
+from gecar.reality.fitting.discrepancy import Discrepancy, discrepancy
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import ripple_responses
 from gecar.reality.fitting.model import Model
@@ -24,6 +25,7 @@ from gecar.world.effects import BY_ID, Parameter
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 RIPPLE = "torque_ripple"
 LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
 PROBE = 0.4  # of a size worth a name: step of finite differences by small changes
@@ -55,6 +57,10 @@ class Problem:
         Effects of the catalogue that are not tried, as recordings set aside do not confirm them.
     worth
         Which share of the catalogue's size is worth a name here, by field of the physics record; 1 where none is given.
+    place
+        Which model left the discrepancy, and what of it was free.
+    kept
+        What was worked out before: recordings are explained once more where an effect is refused.
     """
 
     estimator: Estimator
@@ -66,9 +72,16 @@ class Problem:
     clocks_fitted: bool = False
     refused: frozenset[str] = frozenset()
     worth: Mapping[str, float] = field(default_factory=dict)
-    _changes: dict[tuple[tuple[str, ...], bytes], Array] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    place: Hashable = ()
+    kept: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def once(self, what: str, *about: Hashable, make: Callable[[], T]) -> T:
+        """Return what was worked out before from the same residuals under the same discrepancy, or work it out."""
+        key = (what, self.place, *about)
+        if key not in self.kept:
+            self.kept[key] = make()
+        found: T = self.kept[key]
+        return found
 
     @property
     def residuals(self) -> Residuals:
@@ -95,7 +108,9 @@ class Problem:
         numbers = [k for k in range(len(self.residuals.recordings)) if k != number]
         rest = self.residuals.part(numbers)
         estimator = Estimator(rest, self.estimator.robot, self.estimator.rng)
-        problem = replace(self, estimator=estimator, sizes=self.sizes.of(rest), known=estimator.known())
+        problem = replace(
+            self, estimator=estimator, sizes=self.sizes.of(rest), known=estimator.known(), kept={}
+        )
         return problem, self.residuals.part([number])
 
     def under(self, model: Model, free_effects: Sequence[str] | None = None) -> Problem:
@@ -105,11 +120,11 @@ class Problem:
         """
         if self.on_bench:
             return self
-        return self._beside(model, free_effects, lambda p: (SMALL * self.share(p), LARGE))
+        return self._beside("small", model, free_effects, lambda p: (SMALL * self.share(p), LARGE))
 
     def beside_unnamed(self, model: Model) -> Problem:
         """Return the problem beside changes of all other parameters of a size that a bench leaves open (`unnamed`)."""
-        return self._beside(model, None, lambda p: (UNNAMED * unnamed(p), LARGE * unnamed(p)))
+        return self._beside("unnamed", model, None, lambda p: (UNNAMED * unnamed(p), LARGE * unnamed(p)))
 
     def share(self, parameter: Parameter | None) -> float:
         """Return which share of a parameter's size in the catalogue is worth a name here."""
@@ -117,6 +132,7 @@ class Problem:
 
     def _beside(
         self,
+        changes: str,
         model: Model,
         free_effects: Sequence[str] | None,
         sized: Callable[[Parameter | None], tuple[float, float]],
@@ -125,6 +141,19 @@ class Problem:
         if not self.blocks:
             return self
         kept = model.effects if free_effects is None else free_effects
+        place = (changes, model.key, tuple(sorted(kept)))
+        # One is kept: each takes tens of megabytes.
+        if self.kept.get("place") != place:
+            self.kept["place"], self.kept["left"] = place, self._left_by(model, kept, sized)
+        estimator = self.estimator.under(self.kept["left"])
+        return replace(self, estimator=estimator, known=estimator.known(), place=place)
+
+    def _left_by(
+        self,
+        model: Model,
+        kept: Sequence[str],
+        sized: Callable[[Parameter | None], tuple[float, float]],
+    ) -> Discrepancy:
         slopes, sizes = [], []
         for effect, columns in small_sensitivities(self, model).items():
             slopes.append(np.where(effect in kept, 0.0, columns))
@@ -133,11 +162,9 @@ class Problem:
         errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
         small, large = np.array(sizes).reshape(-1, 2).T
         parameters = sum(len(_small(effect)) for effect in self.catalogue)
-        left = discrepancy(
+        return discrepancy(
             np.concatenate(slopes, axis=1), errors, self.estimator.blocks, channel, small, large, parameters
         )
-        estimator = self.estimator.under(left)
-        return replace(self, estimator=estimator, known=estimator.known())
 
     def with_small_changes(self, model: Model, beside: Model | None = None) -> Physics:
         """Return a model's physics record with the most likely small changes of all other parameters, shape (1,).
@@ -170,9 +197,9 @@ class Problem:
         Maximum a posteriori. Derivatives at the model give the start: what starts to slip a little sooner, or to play,
         is not in proportion to its size.
         """
-        key = (model.effects, model.z.tobytes())
-        if key in self._changes:
-            return self._changes[key]
+        return self.once("small changes", model.key, make=lambda: self._fitted_changes(model))
+
+    def _fitted_changes(self, model: Model) -> Array:
         left = self.estimator.discrepancy
         assert left is not None
         parameters, z, at = self._with_others(model)
@@ -197,7 +224,6 @@ class Problem:
         probes = PROBE * np.minimum(high, 1.0)[moving]
         found = np.zeros(len(at))
         found[moving] = least_squares(residual, start, bounds, probes, REFINEMENTS).z
-        self._changes[key] = found
         return found
 
     def _room(self, parameters: Parameters, z: Array, at: npt.NDArray[np.intp]) -> tuple[Array, Array]:
@@ -230,6 +256,7 @@ class Problem:
             sizes=sizes,
             known=estimator.known(),
             clocks_fitted=True,
+            kept={},
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -69,16 +70,20 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     estimator = problem.estimator
     others = [e for e in problem.catalogue if e not in model.effects and e not in problem.refused]
     estimator.sensitivities(model, others)  # all at once, in lock step
-    trials = [t for t in (_scored(problem, model, e) for e in others) if t]
+    scored = (problem.once("scored", model.key, e, make=partial(_scored, problem, model, e)) for e in others)
+    trials = [trial for trial in scored if trial]
     trials.sort(key=lambda t: -t.promise)
     if not trials or trials[0].promise < PROMISING * PRICE:
         return []
-    begun = [_improved(estimator, t) for t in trials[:IMPROVED]]
+    begun = [
+        problem.once("improved", model.key, t.effect, make=partial(_improved, estimator, t))
+        for t in trials[:IMPROVED]
+    ]
     begun.sort(key=lambda t: t.minimum.cost)
     best = max(t.gain for t in begun)
     steps = [
-        step_of(estimator, t.effect, t.base, _fitted(estimator, t, best))
-        for t in begun[:REFITTED]
+        problem.once("fitted", model.key, t.effect, searched, make=partial(_fitted, estimator, t, searched))
+        for t, searched in ((t, _is_searched(t, best)) for t in begun[:REFITTED])
         if t.gain >= NEGLIGIBLE * best
     ]
     steps.sort(key=lambda s: -s.gain)
@@ -113,14 +118,23 @@ def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
     residual = estimator.residual(trial.parameters)
     bounds, probes = trial.parameters.bounds, trial.parameters.probes
     begun = least_squares(residual, trial.starts[0], bounds, probes, rounds=2, past_jumps=estimator.on_bench)
-    return replace(trial, minimum=begun)
+    return replace(trial, minimum=replace(begun, errors=trial.base.errors))  # those there are not kept
 
 
-def _fitted(estimator: Estimator, trial: _Trial, best: float) -> Model:
-    """Fit an effect in full; search without derivatives where they mislead and the effect is a rival."""
-    if trial.search and trial.gain > COMPETING * best and trial.gain > SEARCHED * PRICE:
-        return _searched(estimator, trial, trial.search)
-    return estimator.fit(trial.effects, trial.values)
+def _is_searched(trial: _Trial, best: float) -> bool:
+    """Whether an effect is searched without derivatives: they mislead, and it is a rival."""
+    rival = trial.gain > COMPETING * best and trial.gain > SEARCHED * PRICE
+    return trial.search is not None and rival
+
+
+def _fitted(estimator: Estimator, trial: _Trial, searched: bool) -> Step:
+    """Fit an effect in full."""
+    if searched:
+        assert trial.search is not None
+        found = _searched(estimator, trial, trial.search)
+    else:
+        found = estimator.fit(trial.effects, trial.values)
+    return step_of(estimator, trial.effect, trial.base, found)
 
 
 def _searched(estimator: Estimator, trial: _Trial, search: Search) -> Model:

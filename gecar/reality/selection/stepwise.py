@@ -34,10 +34,10 @@ from gecar.reality.selection.thresholds import (
     COMPETING,
     LEFT_SHARE,
     MAIN_SHARE,
-    MEASURED,
     MOST_EFFECTS,
     MOST_ON_BENCH,
     PRICE,
+    SEVERAL,
     WHOLE_SHARE,
 )
 from gecar.world.effects import BY_ID
@@ -221,7 +221,7 @@ def _beside_others(problem: Problem, model: Model, step: Step) -> Step:
 
 def _is_much(model: Model, now: float, before: float) -> bool:
     """Whether a model leaves something material, which its laws are not to blame for; in times the line, before too."""
-    return now > MEASURED and now / max(before, 1.0) > left_share(model.effects)
+    return now > SEVERAL and now / max(before, 1.0) > left_share(model.effects)
 
 
 def left_share(effects: Sequence[str]) -> float:

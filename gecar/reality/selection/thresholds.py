@@ -85,10 +85,12 @@ LEFT_SHARE = Threshold(
     "hand: 15 %, which was allowed before, hid a robot pulled to one side beside a camera 40 ms late",
 )
 
-MEASURED = Threshold(
-    1.3,
-    "times the limit of what is material that the remaining error must exceed, because it includes measurement errors",
-    "59 cases of three worlds with nothing concealed: 57 stayed below 1.1, the others at 1.4 and 1.6",
+SEVERAL = Threshold(
+    1.65,
+    "times the limit of what is material that the remaining error must exceed: it includes measurement errors, and may"
+    " be the sum of several things, each below the limit",
+    "seeds 977, 1201, 1301: of 12 cases told as unexplained with nothing material outside the catalogue 5 left less, of"
+    " 10 with it 2",
 )
 
 WORSE = Threshold(

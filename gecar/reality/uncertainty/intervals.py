@@ -21,7 +21,7 @@ from gecar.world.effects import BY_ID
 Array = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.96
-KNOWN = 2.0  # times its lower end, the upper end of a radius that is known
+KNOWN = 3.0  # times its lower end, the upper end of a radius that is known
 FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
 FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
 
