@@ -71,7 +71,9 @@ def reflowed(text: str) -> str:
 
 
 COMMANDS = (
-    CommandEntry("demo", EVOLVE, "Show everything gecar does on one page, in two minutes.", "demo:demo"),
+    CommandEntry(
+        "demo", EVOLVE, "Show everything gecar does on one page, in under three minutes.", "demo:demo"
+    ),
     CommandEntry(
         "evolve", EVOLVE, "Evolve a program that drives the robot around a course.", "evolve:evolve"
     ),
@@ -154,7 +156,7 @@ def _root(
 
     [bold]Start here[/]
 
-      gecar demo               show everything on one page, in two minutes
+      gecar demo               show everything on one page, in under three minutes
       gecar evolve             evolve a program for the paper's course, with pictures
       gecar simulate runs/...  simulate its drive again, or film it
       gecar course list        list the other courses
