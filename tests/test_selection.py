@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -406,3 +408,17 @@ def test_what_makes_held_out_readings_worse_is_a_candidate(
     judged_again = confirmation.with_better_readings(seen, set_aside([1.0]))  # type: ignore[arg-type]
     assert [step.effect for step in judged_again.explained.steps] == [VISCOUS] * kept
     assert [step.effect for step in judged_again.candidates] == [VISCOUS] * (not kept)
+
+
+def test_what_was_worked_out_before_changes_no_second_explanation() -> None:
+    problem = linear_problem(linear({VISCOUS: 2.0, TRACK: 1.0}, RESPONSES))
+    explain(problem)
+    assert problem.kept
+    refused = frozenset({VISCOUS})
+    again, anew = (
+        explain(replace(problem, refused=refused, kept=kept))
+        for kept in (problem.kept, dict[Hashable, Any]())
+    )
+    assert [step.effect for step in again.steps] == [step.effect for step in anew.steps]
+    assert again.taken.z == pytest.approx(anew.taken.z, rel=1e-6)
+    assert VISCOUS not in again.taken.effects
