@@ -82,8 +82,8 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
 def _is_place(model: Model, spans: Mapping[str, Interval]) -> bool:
     """Whether a patch has edges, or surely grips less than half as much as elsewhere.
 
-    One that grips little less, within a radius that may as well be twice as large, is as likely something else: tyres
-    that got dusty.
+    One that grips little less, within a radius that may as well be three times as large, is as likely something else:
+    tyres that got dusty.
     """
     radius, grip = spans["radius_m"], spans["coefficient"]
     elsewhere = float(model.parameters.robot.physics["tyre_friction"][0])
