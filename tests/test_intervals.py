@@ -72,7 +72,7 @@ def test_an_interval_that_contains_neutral_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("low", "grip", "named"), [(0.06, 0.8, True), (0.04, 0.8, False), (0.04, 0.4, True), (0.0, 0.5, False)]
+    ("low", "grip", "named"), [(0.04, 0.8, True), (0.03, 0.8, False), (0.03, 0.4, True), (0.0, 0.5, False)]
 )
 def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: float, named: bool) -> None:
     model = SimpleNamespace(parameters=free(EV3, ["slippery_patch"]))

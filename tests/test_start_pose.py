@@ -105,7 +105,7 @@ def test_without_a_camera_nothing_concealed_is_nothing_found() -> None:
 
 
 def test_without_a_camera_a_sensor_mounted_elsewhere_is_found() -> None:
-    verdict = discover(blind(EV3.with_effects({"sensor_position": {"left_m": 0.012}}), 4))
+    verdict = discover(blind(EV3.with_effects({"sensor_position": {"left_m": 0.012}}), 3))
     assert [f.id for f in verdict.effects] == ["sensor_position"]
     assert verdict.effects[0].parameters["left_m"].value == pytest.approx(0.012, abs=0.001)
     assert verdict.located[0].channel == "reflection"
