@@ -27,7 +27,7 @@ def demo(
 ) -> None:  # fmt: skip
     """Show all of gecar on one page: evolve, drive, see the gap, discover what was left out, evolve again.
 
-    The real robot is a worn one, simulated as well; nothing is needed but this computer, and under three minutes.
+    The real robot is a worn one, simulated as well: all it takes is this computer, and under three minutes.
 
     [bold]Examples[/]
 

@@ -56,9 +56,13 @@ def draw_course(axes: Axes, course: Course, marks: bool = True) -> None:
 
 
 def show_whole(axes: Axes, path: npt.NDArray[np.float64], margin_m: float = 0.03) -> None:
-    """Widen a picture until a path is in it, which may leave the course: x and y [m], shape (samples, 2 or more)."""
+    """Widen the limits of axes to hold a path that may leave the course; x and y [m], shape (samples, 2)."""
+    if axes.get_autoscale_on():  # no course has set limits
+        axes.update_datalim(path)
+        axes.autoscale_view()
+        return
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    (x, y), (last_x, last_y) = np.nanmin(path, axis=0)[:2] - margin_m, np.nanmax(path, axis=0)[:2] + margin_m
+    (x, y), (last_x, last_y) = path.min(axis=0) - margin_m, path.max(axis=0) + margin_m
     axes.set(xlim=(min(left, x), max(right, last_x)), ylim=(min(bottom, y), max(top, last_y)))
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from gecar.plots.courses.course import draw_course
+from gecar.plots.courses.course import draw_course, show_whole
 from gecar.plots.style import BLUE, FAINT, INK, SOFT, VERMILION, headline, look, new_figure
 from gecar.reality.invent.states import states
 from gecar.reality.verdict import Invented, Verdict
@@ -86,8 +86,7 @@ def laws_map_figure(verdict: Verdict) -> Figure:
                 axes.plot(
                     at["at_x"], at["at_y"], "x", color=VERMILION, markersize=10, markeredgewidth=2.5, zorder=4
                 )
-            axes.update_datalim(np.concatenate(ways)[:, 1:3])
-            axes.autoscale(enable=True)
+            show_whole(axes, np.concatenate(ways)[:, 1:3])
             axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
             figure.colorbar(lines, ax=axes, label=_what(law), shrink=0.8)
         cross = "; cross: the point it is counted from" if any(map(_has_point, laws)) else ""

@@ -159,7 +159,7 @@ def _shade_unsolved(axes: Axes, generation: Series, first_solved: int) -> None:
 
 
 def draw_references(axes: Axes, references: Sequence[Reference]) -> None:
-    """Draw times to compare with across a picture of times; its legend names them."""
+    """Draw reference times as horizontal lines, with labels for the legend."""
     dashes = ((0, (5, 3)), (0, (1, 2)), (0, (5, 2, 1, 2)))
     for dash, reference in zip(dashes, references, strict=False):
         words = f"{reference.words}, {reference.time_s:.2f} s"
@@ -167,7 +167,7 @@ def draw_references(axes: Axes, references: Sequence[Reference]) -> None:
 
 
 def _frame(axes: Axes, times: Sequence[float], references: Sequence[Reference]) -> None:
-    """Choose limits that hold the times and the references, with room for their words."""
+    """Choose limits that hold the times and the references."""
     seen = [*times, *(reference.time_s for reference in references)] or [0.0, 60.0]
     low, high = min(seen), max(seen)
     room = max(high - low, 1.0)

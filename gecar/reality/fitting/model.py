@@ -54,7 +54,7 @@ class Model:
 
     @property
     def key(self) -> tuple[tuple[str, ...], bytes]:
-        """What it is told from other models by."""
+        """Its effects and coordinates, which tell it from other models of the same robot."""
         return self.effects, self.minimum.z.tobytes()
 
     @property

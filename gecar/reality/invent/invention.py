@@ -226,7 +226,7 @@ def _explained_with(
     robot = robot.with_terms([*robot.term, *terms])
     estimator = Estimator(problem.residuals, robot, problem.estimator.rng)
     others = under.estimator.discrepancy if under else None
-    problem = replace(problem, estimator=estimator.under(others), kept={})
+    problem = replace(problem, estimator=estimator.under(others), place=(), kept={})
     parameters = free(robot, effects)
     bare = replace(first.taken, effects=tuple(effects), parameters=parameters)
     model: Model = problem.estimator.at(bare, parameters.vector(values))

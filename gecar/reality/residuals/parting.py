@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +39,6 @@ class _Noise(NamedTuple):
 
 
 QUIET = _Noise(0.0, 0.0)
-NOTHING = Size()
 PATH_KNOWN = np.array(
     [0.003, 0.003, 0.01]
 )  # to which a camera, its lens and its mount tell a path [m, m, rad]
@@ -64,7 +63,7 @@ class Sizes:
     runs: tuple[RecordingResiduals, ...]
     sensor: bool
     beside: tuple[RecordingResiduals, ...] = ()
-    off: Size = NOTHING
+    off: Size = field(default_factory=Size)
 
     def of(self, residuals: Residuals) -> Sizes:
         """Return the sizes under the commands of other recordings."""

@@ -108,10 +108,12 @@ class Problem:
         numbers = [k for k in range(len(self.residuals.recordings)) if k != number]
         rest = self.residuals.part(numbers)
         estimator = Estimator(rest, self.estimator.robot, self.estimator.rng)
-        problem = replace(
-            self, estimator=estimator, sizes=self.sizes.of(rest), known=estimator.known(), kept={}
-        )
-        return problem, self.residuals.part([number])
+        return self._anew(estimator), self.residuals.part([number])
+
+    def _anew(self, estimator: Estimator) -> Problem:
+        """Return the problem on other residuals, of which nothing has been worked out."""
+        sizes, known = self.sizes.of(estimator.residuals), estimator.known()
+        return replace(self, estimator=estimator, sizes=sizes, known=known, place=(), kept={})
 
     def under(self, model: Model, free_effects: Sequence[str] | None = None) -> Problem:
         """Return the problem with the discrepancy that a model leaves; effects that are free (its own) are no part.
@@ -140,23 +142,25 @@ class Problem:
         """Return the problem with all other parameters uncertain by a small and a large standard deviation of each."""
         if not self.blocks:
             return self
-        kept = model.effects if free_effects is None else free_effects
-        place = (changes, model.key, tuple(sorted(kept)))
-        # One is kept: each takes tens of megabytes.
-        if self.kept.get("place") != place:
-            self.kept["place"], self.kept["left"] = place, self._left_by(model, kept, sized)
-        estimator = self.estimator.under(self.kept["left"])
+        own = model.effects if free_effects is None else free_effects
+        place = (changes, model.key, tuple(sorted(own)))
+        last_place, left = self.kept.get("discrepancy", (None, None))
+        if place != last_place:
+            left = self._left_by(model, own, sized)
+            self.kept["discrepancy"] = place, left  # the last one only: each takes tens of megabytes
+        estimator = self.estimator.under(left)
         return replace(self, estimator=estimator, known=estimator.known(), place=place)
 
     def _left_by(
         self,
         model: Model,
-        kept: Sequence[str],
+        own: Sequence[str],
         sized: Callable[[Parameter | None], tuple[float, float]],
     ) -> Discrepancy:
+        """Return the discrepancy that a model leaves, of which the effects that are its own are no part."""
         slopes, sizes = [], []
         for effect, columns in small_sensitivities(self, model).items():
-            slopes.append(np.where(effect in kept, 0.0, columns))
+            slopes.append(np.where(effect in own, 0.0, columns))
             of_effect: list[Parameter | None] = [*_small(effect)] if effect in BY_ID else []
             sizes += [sized(p) for p in of_effect or [None] * columns.shape[1]]  # ripples, instruments: none
         errors, channel = self.residuals.errors(model.physics), self.residuals.index.channel
@@ -248,16 +252,7 @@ class Problem:
         self.tell("the camera's clock differs from recording to recording: its offsets are fitted")
         estimator = Estimator(fitted, self.estimator.robot, self.estimator.rng)
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        sizes = self.sizes.of(fitted)
-        return replace(
-            self,
-            estimator=estimator,
-            catalogue=others,
-            sizes=sizes,
-            known=estimator.known(),
-            clocks_fitted=True,
-            kept={},
-        )
+        return replace(self._anew(estimator), catalogue=others, clocks_fitted=True)
 
 
 def problem_of(

@@ -82,8 +82,8 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     begun.sort(key=lambda t: t.minimum.cost)
     best = max(t.gain for t in begun)
     steps = [
-        problem.once("fitted", model.key, t.effect, searched, make=partial(_fitted, estimator, t, searched))
-        for t, searched in ((t, _is_searched(t, best)) for t in begun[:REFITTED])
+        problem.once("fitted", model.key, t.effect, search, make=partial(_fitted, estimator, t, search))
+        for t, search in ((t, _search_of(t, best)) for t in begun[:REFITTED])
         if t.gain >= NEGLIGIBLE * best
     ]
     steps.sort(key=lambda s: -s.gain)
@@ -121,19 +121,15 @@ def _improved(estimator: Estimator, trial: _Trial) -> _Trial:
     return replace(trial, minimum=replace(begun, errors=trial.base.errors))  # those there are not kept
 
 
-def _is_searched(trial: _Trial, best: float) -> bool:
-    """Whether an effect is searched without derivatives: they mislead, and it is a rival."""
+def _search_of(trial: _Trial, best: float) -> Search | None:
+    """Return how to search for an effect without derivatives, where they mislead and it is a rival; else None."""
     rival = trial.gain > COMPETING * best and trial.gain > SEARCHED * PRICE
-    return trial.search is not None and rival
+    return trial.search if rival else None
 
 
-def _fitted(estimator: Estimator, trial: _Trial, searched: bool) -> Step:
+def _fitted(estimator: Estimator, trial: _Trial, search: Search | None) -> Step:
     """Fit an effect in full."""
-    if searched:
-        assert trial.search is not None
-        found = _searched(estimator, trial, trial.search)
-    else:
-        found = estimator.fit(trial.effects, trial.values)
+    found = _searched(estimator, trial, search) if search else estimator.fit(trial.effects, trial.values)
     return step_of(estimator, trial.effect, trial.base, found)
 
 
