@@ -16,26 +16,33 @@ from benchmarks.concealed.judging import judge
 from benchmarks.concealed.plan import Counts, plan
 from benchmarks.concealed.robot import EV3
 from benchmarks.concealed.settings import Setting
+from benchmarks.concealed.sizes import is_material
 
 UNSEEN = {"d_prime": {}, "groups": {}, "timeline": [], "by_channel": {}}
 
 
 @pytest.fixture(scope="module")
-def empty(tmp_path_factory):
-    """A case with nothing concealed, and a verdict on it that states limits."""
-    out = tmp_path_factory.mktemp("limits")
+def short():
+    """Cases of two recordings of three seconds."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cases, "SECONDS", 3.0)
         patch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
-        draw_case("c001", "none", (), (1,), out, Manner("continuous", background=True))
-        (out / "verdicts" / "c001").mkdir(parents=True)
-        limits = {
-            "backlash": {"size": 2.5, "unit": "deg"},
-            "floor_tilt": {"size": 0.01, "unit": "rad"},
-            "pose_delay": None,
-        }
-        (out / "verdicts" / "c001" / "verdict.json").write_text(json.dumps({"limits": limits}))
-        yield out
+        yield
+
+
+@pytest.fixture(scope="module")
+def empty(short, tmp_path_factory):
+    """A case with nothing concealed, and a verdict on it that states limits."""
+    out = tmp_path_factory.mktemp("limits")
+    draw_case("c001", "none", (), (1,), out, Manner("continuous", background=True))
+    (out / "verdicts" / "c001").mkdir(parents=True)
+    limits = {
+        "backlash": {"size": 2.5, "unit": "deg"},
+        "floor_tilt": {"size": 0.01, "unit": "rad"},
+        "pose_delay": None,
+    }
+    (out / "verdicts" / "c001" / "verdict.json").write_text(json.dumps({"limits": limits}))
+    return out
 
 
 def rows(path):
@@ -60,6 +67,15 @@ def test_an_effect_is_concealed_at_the_limit_in_the_empty_cases_robot_under_its_
     old, new = (rows(root / "cases" / "c001" / "run_01_holds.csv") for root in (empty, tmp_path))
     assert [row["left_duty_pct"] for row in old] == [row["left_duty_pct"] for row in new]
     assert [row["heading_deg"] for row in old] != [row["heading_deg"] for row in new]
+
+
+def test_what_is_drawn_as_material_is_and_is_drawn_again_alike(short, tmp_path):
+    draw_case("c001", "single", ("sensor_gain",), (4,), tmp_path, Manner("continuous", True, material=True))
+    label = json.loads((tmp_path / "sealed" / "c001" / "label.json").read_text())
+    assert label["material"]
+    assert is_material(label["size_repeatedly"]["sensor_gain"])
+    _, case, _, _ = cases.redrawn(tmp_path, label)
+    assert case.manner.material
 
 
 def test_verdicts_that_state_no_limit_are_refused(empty, tmp_path):

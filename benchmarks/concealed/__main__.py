@@ -81,6 +81,9 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument(
         "--without", choices=("light", "camera", "encoders"), default="", help="a sensor that no case has"
     )
+    plan.add_argument(
+        "--material", action="store_true", help="with a background: everything concealed is material"
+    )
     plan.set_defaults(command=_plan)
 
     exam = commands.add_parser("exam", help="all of it: draw, seal, run, score, write the tables; resumes")
@@ -223,6 +226,7 @@ def _plan(chosen: argparse.Namespace) -> int:
         last=chosen.last,
         pace=chosen.pace,
         without=chosen.without,
+        material=chosen.material,
     )
     print(draw_all(cases, chosen.out, chosen.workers))
     return 0

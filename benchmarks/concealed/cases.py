@@ -43,6 +43,17 @@ FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
 _QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
+_FROM_WEAK = (
+    -0.5,
+    -0.25,
+    0.0,
+    0.2,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # shares of the log range, to find what is just material
+_LOUD_TIMES = 3.0  # d' of the strongest that is drawn to that of what is just material, at least
 _ATTEMPTS = 20  # a robot that topples that often is not drawn anew
 _REHEARSED = (0, 2, 3, 4)  # of eight recordings: enough to learn how loud something is
 _BACKGROUND_MM = (1.0, 5.0)  # how far a background moves the robot within a recording, and
@@ -65,12 +76,15 @@ class Manner:
         duties are sealed beside the case: what is learned from slow ones can be judged by faster ones.
     without
         A sensor that no case has, one of ``SENSORS``; all may be there if empty.
+    material
+        Whether strengths are drawn from what is just material up, where there is a background; most are smaller else.
     """
 
     world: str = "mujoco"
     background: bool = False
     pace: float = 1.0
     without: str = ""
+    material: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,6 +181,8 @@ def seal_truth(
         about |= {"pace": manner.pace}
     if manner.without:
         about |= {"without": manner.without}
+    if manner.material:
+        about |= {"material": True}
     if manner.background or manner.world != "mujoco":
         about |= {"world": manner.world, "setting": case.setting.as_label()}
         about |= _measured(hidden, case, worlds)
@@ -196,7 +212,11 @@ def redrawn(out: Path, label: Mapping[str, Any]) -> tuple[Hidden, Case, dict[str
     things = tuple(effect["id"] for effect in label["effects"])
     things += (label["outside"]["id"],) if label["outside"] else ()
     manner = Manner(
-        label.get("world", "mujoco"), "background" in label, label.get("pace", 1.0), label.get("without", "")
+        label.get("world", "mujoco"),
+        "background" in label,
+        label.get("pace", 1.0),
+        label.get("without", ""),
+        label.get("material", False),
     )
     with np.load(out / "sealed" / label["case"] / "truth.npz") as archive:
         sealed = archive["run0_on"]
@@ -334,7 +354,7 @@ def _conceal_tuned(
     for effect in effects:
         seed = int(rng.integers(2**32))
         quietest = _QUIETEST if len(effects) == 1 else _QUIETEST_OF_MANY
-        target = float(np.exp(rng.uniform(np.log(quietest), np.log(_LOUDEST))))
+        loudest, place = _LOUDEST, rng.uniform()
 
         def drawn(share: float, effect: str = effect, seed: int = seed) -> Thing:
             return _thing(effect, np.random.default_rng(seed), Exactly(share), runs)
@@ -343,7 +363,18 @@ def _conceal_tuned(
             robots = drawn(share).on((off,) * runs)
             return tuple(robots[run] for run in chosen)
 
-        share = tuned(lambda share: loudness * rehearsal.d_prime(shown(share)), target)
+        def loud(share: float) -> float:
+            return loudness * rehearsal.d_prime(shown(share))
+
+        if case.manner.material:
+            line = next((one for one in _FROM_WEAK if is_material(rehearsal.size(shown(one)))), 1.0)
+            quietest = max(loud(line), _QUIETEST)
+            loudest = max(_LOUDEST, _LOUD_TIMES * quietest)
+        low, high = np.log([quietest, loudest])
+        target = float(np.exp(low + (high - low) * place))
+        share = tuned(loud, target)
+        if case.manner.material:
+            share = max(share, line)
         if kind == "mixed" and effect in EFFECTS:
             while share < 1.0 and not is_material(rehearsal.size(shown(share))):
                 share = min(share + 0.25, 1.0)

@@ -61,6 +61,7 @@ def plan(
     last: bool = False,
     pace: float = 1.0,
     without: str = "",
+    material: bool = False,
 ) -> list[Planned]:
     """List the cases of an examination.
 
@@ -78,6 +79,8 @@ def plan(
         Share of the usual duties; see :class:`benchmarks.concealed.cases.Manner`.
     without
         A sensor that no case has; what it alone shows is not concealed.
+    material
+        Whether all that is concealed is material; see :class:`benchmarks.concealed.cases.Manner`.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def plan(
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0)))
     contents: list[tuple[str, tuple[str, ...], Manner]] = []
     for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
-        manner = Manner(world, background, pace, without)
+        manner = Manner(world, background, pace, without, material)
         contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, last)]
     order = rng.permutation(len(contents))
     return [
