@@ -19,6 +19,7 @@ Van Loan, Matrix Computations (4th ed.), ch. 2.4 (singular values), 6.1 (ridge),
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,7 @@ from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.replay.channels import CHANNELS
 
 Array = npt.NDArray[np.float64]
+Half = npt.NDArray[np.float32]
 
 ROUNDS = 3  # of weights and ratios, each from what the others leave
 CLIP = 30.0  # standard deviations
@@ -69,18 +71,34 @@ class Discrepancy:
 
     def whitened(self, errors: Array) -> Array:
         """Return residuals of unit variance, shape (n,) or (m, n), from those in units of the sensors' noise."""
-        return self._whitened(errors, self.basis, self.spread)
+        return self._whitened(errors, self._shrinking)
 
     def whitened_beside_parameters(self, errors: Array) -> Array:
         """Return the same where the parameters' small changes are known, and those of instruments and ripples not."""
-        return self._whitened(errors, *self.unnamed)
+        return self._whitened(errors, self._shrinking_unnamed)
 
-    def _whitened(self, errors: Array, basis: Array, spread: Array) -> Array:
-        scaled = errors * self.scale
-        inside = (scaled * self.root_weight) @ basis
-        shrunk = inside * (1.0 - 1.0 / np.sqrt(1.0 + spread**2))
-        out: Array = scaled - (shrunk @ basis.T) / self.root_weight
-        return out
+    def _whitened(self, errors: Array, shrinking: tuple[Half, Half]) -> Array:
+        into, out_of = shrinking
+        scaled: Array = errors * self.scale
+        scaled -= (scaled.astype(np.float32) @ into) @ out_of
+        return scaled
+
+    @cached_property
+    def _shrinking(self) -> tuple[Half, Half]:
+        return self._factors(self.basis, self.spread)
+
+    @cached_property
+    def _shrinking_unnamed(self) -> tuple[Half, Half]:
+        return self._factors(*self.unnamed)
+
+    def _factors(self, basis: Array, spread: Array) -> tuple[Half, Half]:
+        """Return what takes residuals to singular vectors, and from there to what is subtracted.
+
+        Half the width, in twice the speed: most of the time of all fits is spent here.
+        """
+        shrunk = basis * (1.0 - 1.0 / np.sqrt(1.0 + spread**2)) / self.root_weight[:, None]
+        into = basis * self.root_weight[:, None]
+        return into.astype(np.float32), np.ascontiguousarray(shrunk.T, np.float32)
 
     def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
         """Return the most likely small changes within bounds, in the catalogue's sizes, shape (changes,)."""

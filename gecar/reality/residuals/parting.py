@@ -58,12 +58,15 @@ class Sizes:
         More recordings, of which only the commands count: how far two robots part under them.
     off
         How far the path that the sensor took may be off, over one metre: as far as nothing explains the motion.
+    last
+        What the last robot that others were compared with did in each recording, by its physics.
     """
 
     runs: tuple[RecordingResiduals, ...]
     sensor: bool
     beside: tuple[RecordingResiduals, ...] = ()
     off: Size = field(default_factory=Size)
+    last: dict[bytes, list[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def of(self, residuals: Residuals) -> Sizes:
         """Return the sizes under the commands of other recordings."""
@@ -75,9 +78,15 @@ class Sizes:
 
     def apart_of_each(self, one: Physics, others: Sequence[Physics]) -> list[Size]:
         """Return how far one robot parts from each of several others, as `apart` does from one."""
-        of = _reading_apart if self.sensor else _apart
-        parts = [of(run, one, others) for run in (*self.runs, *self.beside)]
-        return [combined([part[k] for part in parts]) for k in range(len(others))]
+        runs, key = (*self.runs, *self.beside), one.tobytes()
+        if key not in self.last:
+            self.last.clear()
+            self.last[key] = [run.readings(one) if self.sensor else _driven(run, one) for run in runs]
+        of, did = _reading_apart if self.sensor else _apart, self.last[key]
+        return [
+            combined([of(run, one, own, other) for run, own in zip(runs, did, strict=True)])
+            for other in others
+        ]
 
     def left(self, physics: Physics, repeatedly: bool = False) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
@@ -107,14 +116,11 @@ def _repeated(sizes: list[float]) -> float:
     return sorted(sizes)[-often]
 
 
-def _apart(run: RecordingResiduals, one: Physics, others: Sequence[Physics]) -> list[Size]:
-    track, (path, wheels) = float(one["track_width"][0]), _driven(run, one)
-    out = []
-    for other in others:
-        other_path, other_wheels = _driven(run, other)
-        poses = _parting(path, other_path, wheels, track, QUIET)
-        out.append(poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET)))
-    return out
+def _apart(run: RecordingResiduals, one: Physics, driven: tuple[Array, Array], other: Physics) -> Size:
+    track, (path, wheels) = float(one["track_width"][0]), driven
+    other_path, other_wheels = _driven(run, other)
+    poses = _parting(path, other_path, wheels, track, QUIET)
+    return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
 
 
 def _driven(run: RecordingResiduals, physics: Physics) -> tuple[Array, Array]:
@@ -159,9 +165,8 @@ def _path_noise(run: RecordingResiduals) -> _Noise:
     return _Noise(float(place), float(heading))
 
 
-def _reading_apart(run: RecordingResiduals, one: Physics, others: Sequence[Physics]) -> list[Size]:
-    readings = run.readings(one)
-    return [Size(reading_pct=_root_mean((readings - run.readings(other)) ** 2)) for other in others]
+def _reading_apart(run: RecordingResiduals, one: Physics, readings: Array, other: Physics) -> Size:  # noqa: ARG001
+    return Size(reading_pct=_root_mean((readings - run.readings(other)) ** 2))
 
 
 def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:

@@ -179,6 +179,23 @@ class Problem:
         parameters = free(self.estimator.robot, list(values))
         return parameters.physics(parameters.vector(values))
 
+    def with_changes_for(self, model: Model, errors: Array) -> Physics:
+        """Return a model's physics record with the small changes that would explain some residuals, shape (1,).
+
+        As derivatives at the model have it; ``errors``, shape (n,), need not be the model's own.
+        """
+        left = self.estimator.discrepancy
+        if left is None:
+            return model.physics
+        parameters, z, at = self._with_others(model)
+        z[at] += self._linear_changes(left, errors, *self._room(parameters, z, at))
+        return parameters.physics(np.clip(z, *parameters.bounds))
+
+    def _linear_changes(self, left: Discrepancy, errors: Array, low: Array, high: Array) -> Array:
+        """Return the most likely small changes by derivatives, within bounds, shape (changes,)."""
+        others = np.full(len(left.small) - len(low), 1.0)  # of instruments and ripples
+        return left.small_changes(errors, np.r_[low, -others], np.r_[high, others])[: len(low)]
+
     def small_changes(self, model: Model, beside: Model | None = None) -> dict[str, dict[str, float]]:
         """Return a model's values with the most likely small changes of all other parameters, by effect and label."""
         if self.estimator.discrepancy is None:
@@ -219,10 +236,7 @@ class Problem:
             return out if changes.ndim == 2 else out[0]
 
         bounds = low[moving], high[moving]
-        others = np.full(len(left.small) - len(at), 1.0)  # of instruments and ripples
-        linear = left.small_changes(
-            self.residuals.errors(model.physics), np.r_[low, -others], np.r_[high, others]
-        )
+        linear = self._linear_changes(left, self.residuals.errors(model.physics), low, high)
         starts = np.array([np.zeros(len(moving)), linear[moving]])
         start = starts[int(np.argmin(cost_of_each(residual, starts)))]
         probes = PROBE * np.minimum(high, 1.0)[moving]
@@ -235,6 +249,10 @@ class Problem:
         lowest, highest = (bound[at] - z[at] for bound in parameters.bounds)
         room = np.array([self.share(parameters.coordinates[k].parameter) for k in at])
         return np.clip(lowest, -room, -LEAST_ROOM), np.clip(highest, LEAST_ROOM, room)
+
+    def with_its_clocks(self, held: Residuals, physics: Physics) -> Residuals:
+        """Return recordings set aside with their cameras' clocks fitted under a robot, where those here were."""
+        return with_fitted_clocks(held, physics)[0] if self.clocks_fitted and not held.sensor else held
 
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
         """Return the problem with camera clocks fitted under a model; None where that gains less than ``least_gain``.

@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 
 AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an effect as without
 LEAST_CHANGE = 1.0  # squared standard deviations: recordings in which an effect does not show
+LEAST_SHOWN = 25.0  # the same: what shows an effect by itself
 ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
 
 
@@ -72,11 +73,35 @@ def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) ->
         value += min(max(move, -LARGEST_MOVE), LARGEST_MOVE)
         if abs(move) < CLOSE:
             break
-    errors = without - value * change
-    variance, spans = _variance_of_sum(index, weights(errors) * errors * change)
-    deviation = np.sqrt(variance) / float(np.sum(curvatures(errors) * change * change))
-    reach = float(student.ppf(1.0 - SIGNIFICANCE, max(spans - 1.0, 1.0)) * deviation)
+    _, reach = _uncertainty(index, without - value * change, change)
     return Share(value, value - reach, value + reach)
+
+
+def least_share_expected(index: ResidualIndex, errors: Array, change: Array, sure: float) -> float:
+    """Return the lower bound of the share that recordings would ask for of an effect that is right; -inf: unseen.
+
+    Parameters
+    ----------
+    index
+        Where the residuals come from.
+    errors
+        Whitened residuals of the right model, shape (n,).
+    change
+        What leaving the effect out changes in them, shape (n,).
+    sure
+        By how many standard deviations the estimate may come out too small.
+    """
+    if float(change @ change) < LEAST_CHANGE:
+        return -np.inf
+    deviation, reach = _uncertainty(index, errors, change)
+    return 1.0 - reach - sure * deviation
+
+
+def _uncertainty(index: ResidualIndex, errors: Array, change: Array) -> tuple[float, float]:
+    """Return a share's standard deviation, and how far its one-sided bounds are from it."""
+    variance, spans = _variance_of_sum(index, weights(errors) * errors * change)
+    deviation = float(np.sqrt(variance) / np.sum(curvatures(errors) * change * change))
+    return deviation, float(student.ppf(1.0 - SIGNIFICANCE, max(spans - 1.0, 1.0)) * deviation)
 
 
 def spread_of_size(folds: npt.NDArray[np.int32], without: Array, with_effect: Array) -> float:

@@ -2,27 +2,36 @@
 
 An effect of a certain size is added to the robot found. What that changes in the recordings' residuals, beside small
 changes of all constants and in units of the noise, is what it would gain: half its square, give or take a normal number
-times its root. The limit is the size at which that passes the price of a name in 95 of 100 cases, and which is worth a
-name and material. A patch's holds for nine of ten places where the robot has been.
+times its root. The limit is the size, worth a name and material, at which in 95 of 100 cases
+
+- that passes the price of a name,
+- it gains more than any other effect would in its place,
+- the recordings set aside confirm it beside the small changes that make up for it in those fitted on.
+
+A patch's limit holds for nine of ten places where the robot has been.
 
 Sources: Feldman and Cousins, Physical Review D 57 (1998) 3873 (sensitivity: the limit where nothing is there); the
-noncentral chi-square of a matched filter, Kay, Fundamentals of Statistical Signal Processing II (1998), ch. 4.
+noncentral chi-square of a matched filter, Kay, Fundamentals of Statistical Signal Processing II (1998), ch. 4; Cox,
+Proc. 4th Berkeley Symposium (1961) 105 (of two models, the right one gains half the square of what parts them more).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.initial_values import initial_values, patches
 from gecar.reality.fitting.model import Model
-from gecar.reality.fitting.parameters import Parameters, free
+from gecar.reality.fitting.parameters import free
 from gecar.reality.optimisation.least_squares import costs
+from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import worthwhile
 from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.share import LEAST_SHOWN, least_share_expected
 from gecar.reality.selection.thresholds import PRICE
 from gecar.reality.verdict import Limit
 from gecar.world.effects import BY_ID
@@ -31,86 +40,162 @@ Array = npt.NDArray[np.float64]
 
 LARGEST = 60.0  # of the catalogue's sizes: more than any bound
 TRIED = 12  # sizes
+AT_ONCE = 3  # of them
 SURE = 1.645  # 95 % quantile of a normal distribution
-NEEDED = np.sqrt(2.0 * PRICE) + SURE
+NEEDED = float(np.sqrt(2.0 * PRICE)) + SURE  # standard deviations
+APART = 2.0 * SURE  # the same, from what any other effect would do in its place
 MOST_PLACES = 10  # on the floor, where an effect has one
 SEEN_PLACES = 0.9  # share of them that must show it
 MARGIN = 1.15  # on the size: what a limit is computed with is a little off, too
+FAINT = 1e-9
 
 
-def limits(problem: Problem, model: Model) -> dict[str, Limit | None]:
+def limits(problem: Problem, model: Model, held: Residuals) -> dict[str, Limit | None]:
     """Return the limit of every effect of a problem that a model does not hold; None where any size would pass unseen.
 
     Parameters
     ----------
     problem, model
         The problem, under the discrepancy the model leaves.
+    held
+        Residuals of the recordings set aside, which must confirm an effect; all may be there if there are none.
     """
-    return {
-        effect: _limit(problem, model, effect) for effect in problem.catalogue if effect not in model.effects
-    }
+    others = [effect for effect in problem.catalogue if effect not in model.effects]
+    rivals = dict(zip(others, map(_directions, problem.estimator.sensitivities(model, others)), strict=True))
+    clocked = problem.with_its_clocks(held, model.physics)
+    aside = _Held(clocked, clocked.errors(problem.with_small_changes(model)))
+    return {effect: _Search(problem, model, aside, rivals, effect).limit() for effect in others}
 
 
-def _limit(problem: Problem, model: Model, effect: str) -> Limit | None:
-    parameters = free(problem.estimator.robot, (*model.effects, effect))
-    k = next(k for k, c in enumerate(parameters.coordinates) if c.effect.id == effect)
-    c, low, high = parameters.coordinates[k], *(float(bound[k]) for bound in parameters.bounds)
-    sides = [side for side, room in ((1.0, high), (-1.0, -low)) if room > problem.share(c.parameter)]
-    found = [
-        max((_smallest(problem, parameters, shape, k, side) for side in sides), key=abs)
-        for shape in _shapes(problem, model, parameters, effect)
-    ]
-    z = sorted(found, key=abs)[math.ceil(SEEN_PLACES * len(found)) - 1]
-    if math.isinf(z):
-        return None
-    return Limit(float(c.value(z) if c.inverse else abs(c.value(z) - c.neutral)), c.parameter.unit)
+def _directions(slopes: Array) -> Array:
+    """Return orthonormal directions in which an effect changes residuals, shape (n, k)."""
+    return np.linalg.qr(slopes[:, np.linalg.norm(slopes, axis=0) > FAINT])[0]
 
 
-def _shapes(problem: Problem, model: Model, parameters: Parameters, effect: str) -> list[Array]:
-    """Return a model's coordinates with an effect's shape: as searches begin, or at several places on the floor."""
-    tried: Sequence[Mapping[str, float]] = ()
-    if BY_ID[effect].at_a_place:
-        tried = patches(problem.recordings, MOST_PLACES)
-    elif any(p.worthwhile == 0.0 for p in BY_ID[effect].parameters[1:]):
-        trial = problem.estimator.trial(model, effect)
-        tried = list(initial_values(effect, problem.estimator.robot, problem.recordings, trial))[:1]
-    return [parameters.vector({**model.values, effect: values}) for values in tried or ({},)]
+class _Held(NamedTuple):
+    """Residuals of the recordings set aside, and what they are under the model found."""
+
+    residuals: Residuals
+    errors: Array
 
 
-def _smallest(problem: Problem, parameters: Parameters, start: Array, k: int, side: float) -> float:
-    """Return the smallest value of a coordinate, on one side of neutral, that would be named; infinite: none would."""
-    coordinate, (low, high) = parameters.coordinates[k], parameters.bounds
-    scale = 1.0 if not coordinate.inverse else high[k] / LARGEST
-    sizes = np.geomspace(problem.share(coordinate.parameter), LARGEST, TRIED)
-    vectors = np.tile(start, (TRIED + 1, 1))
-    vectors[:, k] = np.clip(side * scale * np.r_[0.0, sizes], low[k], high[k])
-    none, *some = problem.estimator.residual(parameters)(vectors)
-    shown = np.array([_shown(errors - none) for errors in some])
-    enough = np.flatnonzero(shown >= NEEDED)
-    if not len(enough):
+class _Search:
+    """The search for one effect's limit.
+
+    Parameters
+    ----------
+    problem, model
+        As `limits` takes them.
+    held
+        The recordings set aside.
+    rivals
+        Directions in which every effect changes residuals, by effect.
+    effect
+        Which one.
+    """
+
+    def __init__(
+        self, problem: Problem, model: Model, held: _Held, rivals: Mapping[str, Array], effect: str
+    ) -> None:
+        self._problem, self._model, self._held, self._effect = problem, model, held, effect
+        self._rivals = [directions for other, directions in rivals.items() if other != effect]
+        self._parameters = free(problem.estimator.robot, (*model.effects, effect))
+        coordinates = self._parameters.coordinates
+        self._k = next(k for k, c in enumerate(coordinates) if c.effect.id == effect)
+
+    def limit(self) -> Limit | None:
+        """Return it: the larger of both sides of neutral, at nine of ten places."""
+        c = self._parameters.coordinates[self._k]
+        low, high = (float(bound[self._k]) for bound in self._parameters.bounds)
+        least = self._problem.share(c.parameter)
+        sides = [side for side, room in ((1.0, high), (-1.0, -low)) if room > least]
+        found = [max((self._smallest(shape, side) for side in sides), key=abs) for shape in self._shapes()]
+        z = sorted(found, key=abs)[math.ceil(SEEN_PLACES * len(found)) - 1]
+        if math.isinf(z):
+            return None
+        return Limit(float(c.value(z) if c.inverse else abs(c.value(z) - c.neutral)), c.parameter.unit)
+
+    def _shapes(self) -> list[Array]:
+        """Return the model's coordinates with the effect's shape: as searches begin, or at several places."""
+        problem, model, effect = self._problem, self._model, self._effect
+        tried: Sequence[Mapping[str, float]] = ()
+        if BY_ID[effect].at_a_place:
+            tried = patches(problem.recordings, MOST_PLACES)
+        elif any(p.worthwhile == 0.0 for p in BY_ID[effect].parameters[1:]):
+            trial = problem.estimator.trial(model, effect)
+            tried = list(initial_values(effect, problem.estimator.robot, problem.recordings, trial))[:1]
+        return [self._parameters.vector({**model.values, effect: values}) for values in tried or ({},)]
+
+    def _smallest(self, start: Array, side: float) -> float:
+        """Return the smallest value of the coordinate, on one side of neutral, that would be named; infinite: none."""
+        k, coordinate = self._k, self._parameters.coordinates[self._k]
+        low, high = (float(bound[k]) for bound in self._parameters.bounds)
+        scale = side * (1.0 if not coordinate.inverse else high / LARGEST)
+        sizes = scale * np.geomspace(self._problem.share(coordinate.parameter), LARGEST, TRIED)
+        vectors = np.tile(start, (TRIED + 1, 1))
+        vectors[:, k] = np.clip(np.r_[0.0, sizes], low, high)
+        before, none = 0.0, vectors[0]
+        for n, (margin, change) in enumerate(self._tried(vectors)):
+            z = vectors[n + 1]
+            matters = margin >= 1.0 and self._matters(none, z)
+            now = min(margin, self._confirmed(none, z, change)) if matters else margin
+            if matters and now >= 1.0:
+                found = z[k] if n == 0 or before >= 1.0 else _between(sizes[n - 1 : n + 1], before, now)
+                return float(np.clip(MARGIN * found, low, high))
+            before = now
         return math.inf
-    for n in range(int(enough[0]), TRIED):
-        if worthwhile(parameters, vectors[n + 1], coordinate.effect.id, problem.share) and _material(
-            problem, parameters, vectors[0], vectors[n + 1]
-        ):
-            z = side * scale * _between(sizes, shown, n) if n == enough[0] else vectors[n + 1, k]
-            return float(np.clip(MARGIN * z, low[k], high[k]))
-    return math.inf
+
+    def _tried(self, vectors: Array) -> Iterator[tuple[float, Array]]:
+        """Yield of each vector but the first, neutral one how much more than must shows, and the change it makes."""
+        errors = self._problem.residuals.errors_of_each
+        none = errors(self._parameters.physics(vectors[:1]))[0]
+        for first in range(1, len(vectors), AT_ONCE):  # most limits are small
+            changes = errors(self._parameters.physics(vectors[first : first + AT_ONCE])) - none
+            yield from zip(self._seen(changes).tolist(), changes, strict=True)
+
+    def _seen(self, changes: Array) -> Array:
+        """Return how many times as much of changes of residuals, shape (sizes, n), shows as must; shape (sizes,).
+
+        Large changes count as in costs. What of a change a rival makes up for is no reason to name this effect.
+        """
+        changes = self._problem.estimator.whitened(changes)
+        squares = np.sum(changes**2, axis=1)
+        alike = [np.sum((changes @ directions) ** 2, axis=1) for directions in self._rivals]
+        shown = np.sqrt(2.0 * np.sum(costs(changes), axis=1))
+        own = np.sqrt(
+            np.clip(1.0 - np.max(alike, axis=0, initial=0.0) / np.maximum(squares, FAINT), 0.0, 1.0)
+        )
+        return np.asarray(np.minimum(shown / NEEDED, own * shown / APART))
+
+    def _confirmed(self, without: Array, with_it: Array, change: Array) -> float:
+        """Return by how many times recordings set aside pass what confirms an effect, which makes this change.
+
+        The share of it that they ask for is 1, give or take its standard deviation; with the small changes that make up
+        for it where it is absent, or without them. An effect that they do not show must show in two others.
+        """
+        problem, (held, noise), physics = self._problem, self._held, self._parameters.physics
+        if not held.recordings:
+            return math.inf
+        before, after = held.errors_of_each(np.concatenate([physics(without), physics(with_it)]))
+        least = least_share_expected(held.index, noise, after - before, SURE)
+        if math.isinf(least):
+            shown = np.bincount(problem.residuals.index.recording, change**2) >= LEAST_SHOWN
+            return math.inf if BY_ID[self._effect].at_a_place or np.sum(shown) > 1 else 0.0
+        if least > 0.0:
+            made_up = held.errors(problem.with_changes_for(self._model, -change))
+            least = min(least, least_share_expected(held.index, noise, after - made_up, SURE))
+        return 1.0 / (1.0 - least)
+
+    def _matters(self, without: Array, with_it: Array) -> bool:
+        """Whether a size is worth a name and material."""
+        problem, parameters = self._problem, self._parameters
+        if not worthwhile(parameters, with_it, self._effect, problem.share):
+            return False
+        size = problem.sizes.apart(parameters.physics(without), parameters.physics(with_it))
+        return problem.material.times(size) >= 1.0
 
 
-def _between(sizes: Array, shown: Array, n: int) -> float:
-    """Return the size at which `NEEDED` is reached, interpolated between the n-th size and the one before."""
-    if n == 0 or shown[n] <= shown[n - 1]:
-        return float(sizes[n])
-    share = np.log(NEEDED / max(shown[n - 1], 1e-9)) / np.log(shown[n] / max(shown[n - 1], 1e-9))
-    return float(sizes[n - 1] * (sizes[n] / sizes[n - 1]) ** np.clip(share, 0.0, 1.0))
-
-
-def _shown(change: Array) -> float:
-    """Return how far two robots' residuals part, in standard deviations; large residuals count as in costs."""
-    return float(np.sqrt(2.0 * np.sum(costs(change))))
-
-
-def _material(problem: Problem, parameters: Parameters, without: Array, with_it: Array) -> bool:
-    size = problem.sizes.apart(parameters.physics(without), parameters.physics(with_it))
-    return problem.material.times(size) >= 1.0
+def _between(sizes: Array, before: float, now: float) -> float:
+    """Return the size at which a margin passes 1, interpolated between two sizes; it is less there and more here."""
+    share = math.log(1.0 / max(before, FAINT)) / math.log(now / max(before, FAINT))
+    return float(sizes[0] * (sizes[1] / sizes[0]) ** share)
