@@ -17,7 +17,7 @@ from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import stepwise
-from gecar.reality.selection.acceptance import candidates, worsens
+from gecar.reality.selection.acceptance import candidates, stands_out, unevenness, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
@@ -329,6 +329,24 @@ def test_what_recordings_set_aside_do_not_show_is_confirmed_by_those_fitted_on(
     assert [step.effect for step in proof.explained.steps] == [VISCOUS] * kept
     assert [step.effect for step in proof.candidates] == [VISCOUS] * (not kept)
     assert not kept or proof.explained.steps[0].holdout_gain > 100.0
+
+
+@pytest.mark.parametrize("share", [1.0, 3.0])
+def test_beside_much_that_is_unexplained_the_effect_of_one_size_is_named(share: float) -> None:
+    residuals = linear({VISCOUS: 25.0}, RESPONSES)
+    uneven = np.repeat([3.0, 0.5, 5.0, 1.0], len(residuals.noise) // 4) * RESPONSES[INERTIA]
+    other = replace(residuals, noise=residuals.noise + share * (uneven + bumps(9, 4, 1.0)))
+    explained = explain(linear_problem(other))
+    assert explained.unexplained
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert stands_out(explained.problem, explained.steps[0])
+
+
+def test_an_effect_that_explains_next_to_nothing_is_uneven() -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    (step,) = explained.steps
+    assert unevenness(explained.problem, step) < 0.1
+    assert unevenness(explained.problem, replace(step, base=step.model)) == np.inf
 
 
 def test_an_imitation_that_recordings_set_aside_do_not_show_is_a_candidate() -> None:

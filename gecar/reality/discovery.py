@@ -18,7 +18,6 @@ from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import notes_on
 from gecar.reality.evidence import Evidence
-from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.corrected_replay import with_formulas
@@ -31,8 +30,10 @@ from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.prove.confirmation import (
     Confirmation,
+    confirmed,
     dropped,
     explained_and_confirmed,
+    standing_out,
     with_better_readings,
 )
 from gecar.reality.prove.holdout import Contender, judge
@@ -43,11 +44,11 @@ from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.acceptance import is_worthwhile, size_of, steady, worsens
+from gecar.reality.selection.acceptance import is_worthwhile, size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, concluded
+from gecar.reality.selection.stepwise import Explanation, concluded, explain
 from gecar.reality.selection.thresholds import SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -263,6 +264,8 @@ class _Stage(Confirmation):
     ----------
     spans
         95 % intervals of the effects' parameters, by effect and label.
+    held
+        The recordings set aside that were to confirm them.
     laws, invented
         The laws, and what the verdict says of them.
     left_out
@@ -270,6 +273,7 @@ class _Stage(Confirmation):
     """
 
     spans: Spans
+    held: Residuals
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
     left_out: str = ""
@@ -281,7 +285,7 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
     If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
     """
     problem = _problem(context, context.robot, fitted, held)
-    motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held)), held)
+    motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held), held))
     if motion.explained.unexplained and not motion.laws:
         others = (_explained_without(context, each, fitted, held) for each in INSTRUMENTS)
         motion = next(filter(None, others), motion)
@@ -303,7 +307,7 @@ def _explained_without(
         return None
     context.tell(f"much is unexplained: once more without the {instrument}")
     problem = _problem(context, context.robot, alone, beside)
-    motion = _with_intervals(context, explained_and_confirmed(problem, beside))
+    motion = _with_intervals(context, confirmed(explain(problem), beside), beside)
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
     # What is left out may be off, but a cause does not take the robot farther from it; and what is smaller than the
     # catalogue's size, or has not one size in all recordings, may be part of what is left.
@@ -311,7 +315,7 @@ def _explained_without(
         not motion.explained.steps
         or motion.explained.unexplained
         or not all(
-            is_worthwhile(taken, step.effect) and steady(motion.explained.problem, step)
+            is_worthwhile(taken, step.effect) and stands_out(motion.explained.problem, step)
             for step in motion.explained.steps
         )
         or worsens(problem, problem.known, taken, whole)
@@ -345,11 +349,12 @@ def _explain_sensor(
     seen = explained_and_confirmed(problem, beside)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     seen = with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), beside)
-    stage = _with_intervals(context, seen)
-    return _with_laws(context, stage, beside)
+    if motion.unexplained:
+        seen = standing_out(seen)
+    return _with_laws(context, _with_intervals(context, seen, beside))
 
 
-def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:
+def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     """Add laws that explain what a stage's effects do not, where laws are wanted.
 
     Effects may imitate what no list holds: where they leave something material even with laws beside them, laws are
@@ -357,21 +362,19 @@ def _with_laws(context: _Context, stage: _Stage, held: Residuals) -> _Stage:
     """
     if context.language is None or not (stage.explained.unexplained or context.invents):
         return stage
-    beside = _with_laws_on(context, context.language, stage, stage.explained, held)
+    beside = _with_laws_on(context, context.language, stage, stage.explained)
     if not stage.explained.steps or _left(beside) < 1.0:
         return beside
     context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
     problem = stage.explained.problem
     bare = concluded(problem, problem.known, (), stage.explained.tried)
-    alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare, held)
+    alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
     return alone if _left(alone) < INSTEAD * _left(beside) else beside
 
 
-def _with_laws_on(
-    context: _Context, language: Grammar, stage: _Stage, explained: Explanation, held: Residuals
-) -> _Stage:
+def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained: Explanation) -> _Stage:
     """Return a stage with this explanation in place of its own, and laws added to it."""
-    written = invent(explained, held, language, context.seed, context.tell)
+    written = invent(explained, stage.held, language, context.seed, context.tell)
     stage = replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
     return replace(stage, spans=_spans(context, written.explained)) if written.terms else stage
 
@@ -383,8 +386,7 @@ def _left(stage: _Stage) -> float:
 
 def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
     """Return the recordings set aside with the nuisances of those fitted on, fitted anew under a robot's physics."""
-    clocked = with_fitted_clocks(held, physics)[0] if motion.problem.clocks_fitted else held
-    return _along_paths(clocked, motion, physics)
+    return _along_paths(motion.problem.with_its_clocks(held, physics), motion, physics)
 
 
 def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
@@ -395,7 +397,7 @@ def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray
     return residuals.localised(physics).with_paths(physics, inflation)
 
 
-def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
+def _with_intervals(context: _Context, confirmation: Confirmation, held: Residuals) -> _Stage:
     """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate."""
     explained, candidates = confirmation.explained, confirmation.candidates
     context.tell("intervals")
@@ -406,7 +408,7 @@ def _with_intervals(context: _Context, confirmation: Confirmation) -> _Stage:
             break
         weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
-    return _Stage(explained, candidates, confirmation.unseen, _spans(context, explained, spans))
+    return _Stage(explained, candidates, confirmation.unseen, _spans(context, explained, spans), held)
 
 
 def _spans(context: _Context, explained: Explanation, named: Spans | None = None) -> Spans:
@@ -459,7 +461,11 @@ def _sized(context: _Context, problem: Problem, model: Model, step: Step) -> Siz
 
 def _limits(context: _Context, stages: Sequence[_Stage]) -> dict[str, Limit | None]:
     """Return, of every effect that was not found, the smallest size that these recordings would have shown."""
-    seen = {e: each for s in stages for e, each in limits(s.explained.problem, s.explained.taken).items()}
+    seen = {
+        effect: limit
+        for stage in stages
+        for effect, limit in limits(stage.explained.problem, stage.explained.taken, stage.held).items()
+    }
     found = {step.effect for stage in stages for step in stage.explained.steps}
     return {effect.id: seen.get(effect.id) for effect in context.catalogue if effect.id not in found}
 

@@ -8,23 +8,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import reading_error
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.acceptance import worsens
+from gecar.reality.selection.acceptance import stands_out, unevenness, worsens
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.share import UNSEEN, Share, share_asked_for, sums_of_spans
+from gecar.reality.selection.share import (
+    LEAST_SHOWN,
+    UNSEEN,
+    Share,
+    share_asked_for,
+    sums_of_spans,
+)
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
 from gecar.reality.selection.thresholds import MAIN_SHARE, WORSE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
-LEAST_SHOWN = 25.0  # squared standard deviations: what shows an effect by itself
-WHOLLY = 0.1  # by which the bounds of a share may differ from 1 where all of an effect is asked for
+WHOLLY = 0.25  # by which the bounds of a share may differ from 1 where all of an effect is asked for
 APART_S = 1.5  # between two passes of a place
 BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
@@ -215,6 +219,24 @@ def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
     return seen
 
 
+def standing_out(seen: Confirmation) -> Confirmation:
+    """Drop, the most uneven first, effects that do not stand out: where the path on which they were seen is in doubt.
+
+    Readings along a path that is off by itself ask for a sensor that sits elsewhere, reads late, or looks wider.
+    """
+    while True:
+        explained = seen.explained
+        failing = [step for step in explained.steps if not stands_out(explained.problem, step)]
+        if not failing:
+            return seen
+        worst = max(failing, key=lambda step: unevenness(explained.problem, step))
+        seen = replace(
+            seen,
+            explained=dropped(explained, worst),
+            candidates=(*seen.candidates, replace(worst, drifts=True)),
+        )
+
+
 def dropped(explained: Explanation, step: Step) -> Explanation:
     """Return an explanation without an effect, the others refitted; the robot's own value of it comes back."""
     steps = [s for s in (*explained.steps, *explained.minor) if s.effect != step.effect]
@@ -230,6 +252,4 @@ def _without(problem: Problem, model: Model, step: Step) -> Model:
 def _held_errors(explained: Explanation, held: Residuals, model: Model, beside: Model) -> Array:
     """Return a model's residuals of recordings set aside, with small changes as a model asks for."""
     physics = explained.problem.with_small_changes(model, beside)
-    if explained.problem.clocks_fitted and not held.sensor:
-        held = with_fitted_clocks(held, physics)[0]
-    return held.errors(physics)
+    return explained.problem.with_its_clocks(held, physics).errors(physics)

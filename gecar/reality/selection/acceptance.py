@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from gecar.reality.selection.thresholds import (
     BREAKAWAY_SPEED,
     COMPETING,
     LEAST_INVERSE,
+    NEGLIGIBLE,
     PRICE,
     SIGNIFICANCE,
     STEADY,
@@ -168,7 +170,22 @@ def size_of(problem: Problem, model: Model, step: Step) -> Size:
     return problem.sizes.apart(model.physics, parameters.physics(parameters.vector(values)))
 
 
-def steady(problem: Problem, step: Step) -> bool:
-    """Whether an effect has the same size in all recordings; ``problem`` is under the discrepancy its model leaves."""
+def stands_out(problem: Problem, step: Step) -> bool:
+    """Whether an effect stands out of much that is unexplained: by one size everywhere; what imitates has many."""
+    return unevenness(problem, step) < STEADY
+
+
+def unevenness(problem: Problem, step: Step) -> float:
+    """Return the relative spread of an effect's size over recordings; infinite where it explains next to nothing.
+
+    Parameters
+    ----------
+    problem
+        Under the discrepancy that the step's model leaves.
+    step
+        By which the effect was taken.
+    """
     without, with_effect = problem.estimator.models_of(step)
-    return spread_of_size(problem.estimator.blocks.folds, without.errors, with_effect.errors) < STEADY
+    if without.cost - with_effect.cost < NEGLIGIBLE * without.cost:
+        return math.inf
+    return spread_of_size(problem.estimator.blocks.folds, without.errors, with_effect.errors)

@@ -20,8 +20,9 @@ from gecar.reality.selection.acceptance import (
     is_material,
     is_worthwhile,
     proved,
-    steady,
+    stands_out,
     stopped,
+    unevenness,
 )
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.homogeneity import drifts
@@ -33,7 +34,6 @@ from gecar.reality.selection.thresholds import (
     CLOCKS_OVER_COMMON,
     COMPETING,
     LEFT_SHARE,
-    MAIN_SHARE,
     MOST_EFFECTS,
     MOST_ON_BENCH,
     PRICE,
@@ -123,7 +123,7 @@ def _explain_motor(problem: Problem, first: Sequence[Step]) -> Explanation:
         stages = {step.effect: step.stage for step in kept}
         steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, model)]
         chain = replace(chain, steps=tuple(steps), model=model)
-        if {step.effect for step in found.steps} == {step.effect for step in kept}:
+        if _effects(found.steps) == _effects(kept):
             break
     return concluded(problem, model, chain.steps, chain.tried)
 
@@ -157,7 +157,7 @@ def concluded(
             break
         model = _fitted_anew(problem, model, kept)
         problem = problem.under(model)
-        steps = kept if weakest is None else [_beside_others(problem, model, step) for step in kept]
+        steps = [_beside_others(problem, model, step) for step in kept]
     minor = tuple(step for step in steps if not is_material(problem, model, step))
     named, whole = tuple(step for step in steps if step not in minor), model
     if minor:  # what carries no claim bends no other effect's size
@@ -175,18 +175,18 @@ def _standing_beside(
     """Return the effects that may be named beside what they leave: all, unless that is material.
 
     Then effects below the catalogue's size may not: they may be part of what is left. Where they leave much of it,
-    others must have one size in all recordings to a few percent, and explain a good part of what is left without them.
+    others must stand out of it; the most uneven goes first, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
     if not _is_much(model, now, before):
         return list(steps)
+    kept = [step for step in steps if problem.on_bench or is_worthwhile(model, step.effect)]
     hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
-    return [
-        step
-        for step in steps
-        if (problem.on_bench or is_worthwhile(model, step.effect))
-        and (not hardly or (steady(problem, step) and _is_main(problem, model, step, now)))
-    ]
+    if len(kept) < len(steps) or not hardly:
+        return kept
+    imitating = [step for step in kept if not stands_out(problem, step)]
+    worst = max(imitating, key=lambda step: unevenness(problem, step), default=None)
+    return [step for step in kept if step is not worst]
 
 
 def _left(problem: Problem, model: Model) -> Size:
@@ -230,14 +230,6 @@ def left_share(effects: Sequence[str]) -> float:
     return LEFT_SHARE + max(off, default=0.0)
 
 
-def _is_main(problem: Problem, model: Model, step: Step, times: float) -> bool:
-    """Whether an effect explains a good part of what the others leave; ``times`` the line is left with it."""
-    rest = [effect for effect in model.effects if effect != step.effect]
-    here = problem.under(model, rest)
-    fitted = here.estimator.fit(rest, model.values)
-    return times**2 < (1.0 - MAIN_SHARE) * problem.material.times(_left(here, fitted)) ** 2
-
-
 @dataclass(frozen=True)
 class _Chain:
     """One forward selection.
@@ -252,8 +244,11 @@ class _Chain:
     with_clocks: Problem | None = None
 
 
-def _forward(problem: Problem, begun: _Chain, first: Sequence[Step]) -> _Chain:
-    """Continue a chain until nothing more proves itself; the problem is under what its model leaves."""
+def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Chain | None = None) -> _Chain:
+    """Continue a chain until nothing more proves itself; the problem is under what its model leaves.
+
+    It also ends, as the other one, where it has come to the same effects as another chain had.
+    """
     model, steps, tried = begun.model, list(begun.steps), list(begun.tried)
     here, stage = problem, tuple(first)
     most = int(MOST_ON_BENCH if problem.on_bench else MOST_EFFECTS)
@@ -264,6 +259,8 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step]) -> _Chain:
             break
         problem.tell(f"{step.effect}: gains {step.gain:.0f}")
         steps.append(replace(step, stage=len(tried) - 1))
+        if other is not None and _effects(steps) == _effects(other.steps[: len(steps)]):
+            return other
         if len(steps) == most:
             model = step.model
             break
@@ -303,8 +300,12 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
     if len(chain.steps) < 2:
         return []
     rivals = [s for s in first[1:BEGINNINGS] if s.gain > COMPETING * first[0].gain and not stopped(s)]
-    chains = [_forward(problem, _Chain((), problem.known, ()), [step]) for step in rivals]
-    return [other for other in chains if other.with_clocks is None]
+    chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in rivals]
+    return [other for other in chains if other is not chain and other.with_clocks is None]
+
+
+def _effects(steps: Sequence[Step]) -> set[str]:
+    return {step.effect for step in steps}
 
 
 def _best_chain(problem: Problem, chains: Sequence[_Chain]) -> _Chain:
