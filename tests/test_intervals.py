@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,7 +86,8 @@ def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     truth, responses = {VISCOUS: 3.0, TRACK: 4.0}, {VISCOUS: bumps(1, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
-    proof = confirmed(explain(linear_problem(linear(truth, responses))), linear(truth, responses, seed=5))  # type: ignore[arg-type]
+    held: Any = linear(truth, responses, seed=5)
+    proof = confirmed(explain(linear_problem(linear(truth, responses))), held)
     assert {step.effect for step in proof.explained.steps} == {VISCOUS, TRACK}
 
     def wide(*given: object) -> dict:
@@ -95,7 +97,7 @@ def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
         return spans
 
     monkeypatch.setattr(discovery, "intervals", wide)
-    stage = discovery._with_intervals(SimpleNamespace(tell=print, seed=0), proof)  # type: ignore[arg-type]
+    stage = discovery._with_intervals(SimpleNamespace(tell=print, seed=0), proof, held)  # type: ignore[arg-type]
     assert [step.effect for step in stage.explained.steps] == [TRACK]
     assert stage.explained.taken.effects == (TRACK,)
     assert [step.effect for step in stage.candidates] == [VISCOUS]
