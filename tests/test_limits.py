@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linear_case import bumps, linear, linear_problem
 
 from gecar.reality.uncertainty.limits import limits
-from tests.linear_case import bumps, linear, linear_problem
 
 VISCOUS, DRY = "viscous_friction", "coulomb_friction"
 OWN, OTHER = 0.3 * bumps(1, 4, 1.0), 0.3 * bumps(2, 4, 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -43,16 +44,8 @@ FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough
 _DOUBLE_LEAST = 0.4  # two at once are drawn from the upper part of the strengths' log range
 _QUIETEST, _QUIETEST_OF_MANY, _LOUDEST = 3.0, 15.0, 300.0  # d' that strengths are drawn for
-_FROM_WEAK = (
-    -0.5,
-    -0.25,
-    0.0,
-    0.2,
-    0.4,
-    0.6,
-    0.8,
-    1.0,
-)  # shares of the log range, to find what is just material
+# Shares of the log range, to find what is just material.
+_FROM_WEAK = (-0.5, -0.25, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 _LOUD_TIMES = 3.0  # d' of the strongest that is drawn to that of what is just material, at least
 _ATTEMPTS = 20  # a robot that topples that often is not drawn anew
 _REHEARSED = (0, 2, 3, 4)  # of eight recordings: enough to learn how loud something is
@@ -354,7 +347,7 @@ def _conceal_tuned(
     for effect in effects:
         seed = int(rng.integers(2**32))
         quietest = _QUIETEST if len(effects) == 1 else _QUIETEST_OF_MANY
-        loudest, place = _LOUDEST, rng.uniform()
+        loudest, weakest, place = _LOUDEST, -math.inf, rng.uniform()
 
         def drawn(share: float, effect: str = effect, seed: int = seed) -> Thing:
             return _thing(effect, np.random.default_rng(seed), Exactly(share), runs)
@@ -367,14 +360,12 @@ def _conceal_tuned(
             return loudness * rehearsal.d_prime(shown(share))
 
         if case.manner.material:
-            line = next((one for one in _FROM_WEAK if is_material(rehearsal.size(shown(one)))), 1.0)
-            quietest = max(loud(line), _QUIETEST)
+            weakest = next((one for one in _FROM_WEAK if is_material(rehearsal.size(shown(one)))), 1.0)
+            quietest = max(loud(weakest), _QUIETEST)
             loudest = max(_LOUDEST, _LOUD_TIMES * quietest)
         low, high = np.log([quietest, loudest])
         target = float(np.exp(low + (high - low) * place))
-        share = tuned(loud, target)
-        if case.manner.material:
-            share = max(share, line)
+        share = max(tuned(loud, target), weakest)
         if kind == "mixed" and effect in EFFECTS:
             while share < 1.0 and not is_material(rehearsal.size(shown(share))):
                 share = min(share + 0.25, 1.0)

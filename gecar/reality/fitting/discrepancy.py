@@ -30,7 +30,7 @@ from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.replay.channels import CHANNELS
 
 Array = npt.NDArray[np.float64]
-Half = npt.NDArray[np.float32]
+Single = npt.NDArray[np.float32]
 
 ROUNDS = 3  # of weights and ratios, each from what the others leave
 CLIP = 30.0  # standard deviations
@@ -77,24 +77,24 @@ class Discrepancy:
         """Return the same where the parameters' small changes are known, and those of instruments and ripples not."""
         return self._whitened(errors, self._shrinking_unnamed)
 
-    def _whitened(self, errors: Array, shrinking: tuple[Half, Half]) -> Array:
+    def _whitened(self, errors: Array, shrinking: tuple[Single, Single]) -> Array:
         into, out_of = shrinking
         scaled: Array = errors * self.scale
         scaled -= (scaled.astype(np.float32) @ into) @ out_of
         return scaled
 
     @cached_property
-    def _shrinking(self) -> tuple[Half, Half]:
+    def _shrinking(self) -> tuple[Single, Single]:
         return self._factors(self.basis, self.spread)
 
     @cached_property
-    def _shrinking_unnamed(self) -> tuple[Half, Half]:
+    def _shrinking_unnamed(self) -> tuple[Single, Single]:
         return self._factors(*self.unnamed)
 
-    def _factors(self, basis: Array, spread: Array) -> tuple[Half, Half]:
-        """Return what takes residuals to singular vectors, and from there to what is subtracted.
+    def _factors(self, basis: Array, spread: Array) -> tuple[Single, Single]:
+        """Return two matrices: from scaled residuals to coordinates in a basis, and from these to what is subtracted.
 
-        Half the width, in twice the speed: most of the time of all fits is spent here.
+        In single precision, which is twice as fast: a good part of the time of all fits is spent here.
         """
         shrunk = basis * (1.0 - 1.0 / np.sqrt(1.0 + spread**2)) / self.root_weight[:, None]
         into = basis * self.root_weight[:, None]

@@ -14,7 +14,7 @@ from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import reading_error
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.acceptance import stands_out, unevenness, worsens
+from gecar.reality.selection.acceptance import most_uneven, worsens
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import (
     LEAST_SHOWN,
@@ -213,28 +213,26 @@ def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
         known, found = explained.problem.known.physics, explained.taken.physics
         if reading_error(held, found) <= WORSE * reading_error(held, known):
             break
-        weakest = min(explained.steps, key=lambda step: step.holdout_gain)
-        explained = dropped(explained, weakest)
-        seen = replace(seen, explained=explained, candidates=(*seen.candidates, weakest))
+        seen = _refused(seen, min(explained.steps, key=lambda step: step.holdout_gain))
+        explained = seen.explained
     return seen
 
 
 def standing_out(seen: Confirmation) -> Confirmation:
-    """Drop, the most uneven first, effects that do not stand out: where the path on which they were seen is in doubt.
+    """Drop effects whose size differs between recordings, one by one, those that differ most first.
 
-    Readings along a path that is off by itself ask for a sensor that sits elsewhere, reads late, or looks wider.
+    For the colour sensor where the motion is unexplained: readings along a path that is off by itself ask for a sensor
+    that sits elsewhere, reads late, or looks wider.
     """
-    while True:
-        explained = seen.explained
-        failing = [step for step in explained.steps if not stands_out(explained.problem, step)]
-        if not failing:
-            return seen
-        worst = max(failing, key=lambda step: unevenness(explained.problem, step))
-        seen = replace(
-            seen,
-            explained=dropped(explained, worst),
-            candidates=(*seen.candidates, replace(worst, drifts=True)),
-        )
+    while worst := most_uneven(seen.explained.problem, seen.explained.steps):
+        seen = _refused(seen, worst, drifts=True)
+    return seen
+
+
+def _refused(seen: Confirmation, step: Step, drifts: bool = False) -> Confirmation:
+    """Return a confirmation with an effect less and a candidate more."""
+    candidates = (*seen.candidates, replace(step, drifts=True) if drifts else step)
+    return replace(seen, explained=dropped(seen.explained, step), candidates=candidates)
 
 
 def dropped(explained: Explanation, step: Step) -> Explanation:

@@ -38,6 +38,14 @@ class _Noise(NamedTuple):
     heading: float
 
 
+class _Drive(NamedTuple):
+    """A replay: its path as the camera reports it, and by dead reckoning, shapes (rows, 3); and the robot's track."""
+
+    path: Array
+    wheels: Array
+    track_m: float
+
+
 QUIET = _Noise(0.0, 0.0)
 PATH_KNOWN = np.array(
     [0.003, 0.003, 0.01]
@@ -81,12 +89,17 @@ class Sizes:
         runs, key = (*self.runs, *self.beside), one.tobytes()
         if key not in self.last:
             self.last.clear()
-            self.last[key] = [run.readings(one) if self.sensor else _driven(run, one) for run in runs]
-        of, did = _reading_apart if self.sensor else _apart, self.last[key]
+            self.last[key] = [self._did(run, one) for run in runs]
+        apart = _readings_apart if self.sensor else _drives_apart
+        mine = self.last[key]
         return [
-            combined([of(run, one, own, other) for run, own in zip(runs, did, strict=True)])
+            combined([apart(own, self._did(run, other)) for run, own in zip(runs, mine, strict=True)])
             for other in others
         ]
+
+    def _did(self, run: RecordingResiduals, physics: Physics) -> Any:
+        """Return what a robot did under a recording's commands: what its sensor read, or how it drove."""
+        return run.readings(physics) if self.sensor else _driven(run, physics)
 
     def left(self, physics: Physics, repeatedly: bool = False) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
@@ -116,17 +129,15 @@ def _repeated(sizes: list[float]) -> float:
     return sorted(sizes)[-often]
 
 
-def _apart(run: RecordingResiduals, one: Physics, driven: tuple[Array, Array], other: Physics) -> Size:
-    track, (path, wheels) = float(one["track_width"][0]), driven
-    other_path, other_wheels = _driven(run, other)
-    poses = _parting(path, other_path, wheels, track, QUIET)
-    return poses.or_more(_parting(wheels, other_wheels, wheels, track, QUIET))
+def _drives_apart(one: _Drive, other: _Drive) -> Size:
+    poses = _parting(one.path, other.path, one.wheels, one.track_m, QUIET)
+    return poses.or_more(_parting(one.wheels, other.wheels, one.wheels, one.track_m, QUIET))
 
 
-def _driven(run: RecordingResiduals, physics: Physics) -> tuple[Array, Array]:
-    """Return a replay's path as the camera reports it, and by dead reckoning, shapes (rows, 3)."""
+def _driven(run: RecordingResiduals, physics: Physics) -> _Drive:
     played = _replayed(run, physics)
-    return _seen(run, played, physics), _reckoned(run, physics, played.rows)
+    path, wheels = _seen(run, played, physics), _reckoned(run, physics, played.rows)
+    return _Drive(path, wheels, float(physics["track_width"][0]))
 
 
 def _left(run: RecordingResiduals, physics: Physics) -> Size:
@@ -165,8 +176,8 @@ def _path_noise(run: RecordingResiduals) -> _Noise:
     return _Noise(float(place), float(heading))
 
 
-def _reading_apart(run: RecordingResiduals, one: Physics, readings: Array, other: Physics) -> Size:  # noqa: ARG001
-    return Size(reading_pct=_root_mean((readings - run.readings(other)) ** 2))
+def _readings_apart(one: Array, other: Array) -> Size:
+    return Size(reading_pct=_root_mean((one - other) ** 2))
 
 
 def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:

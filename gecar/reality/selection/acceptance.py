@@ -171,8 +171,15 @@ def size_of(problem: Problem, model: Model, step: Step) -> Size:
 
 
 def stands_out(problem: Problem, step: Step) -> bool:
-    """Whether an effect stands out of much that is unexplained: by one size everywhere; what imitates has many."""
+    """Whether an effect has nearly one size in all recordings, as causes have beside physics that nothing explains."""
     return unevenness(problem, step) < STEADY
+
+
+def most_uneven(problem: Problem, steps: Sequence[Step]) -> Step | None:
+    """Return the effect whose size differs most between recordings, of those that do not stand out; None: all do."""
+    spreads = [(unevenness(problem, step), step) for step in steps]
+    spread, worst = max(spreads, key=lambda pair: pair[0], default=(0.0, None))
+    return worst if spread >= STEADY else None
 
 
 def unevenness(problem: Problem, step: Step) -> float:

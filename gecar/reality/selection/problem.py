@@ -111,7 +111,7 @@ class Problem:
         return self._anew(estimator), self.residuals.part([number])
 
     def _anew(self, estimator: Estimator) -> Problem:
-        """Return the problem on other residuals, of which nothing has been worked out."""
+        """Return the problem with another estimator's residuals; nothing of it has been worked out yet."""
         sizes, known = self.sizes.of(estimator.residuals), estimator.known()
         return replace(self, estimator=estimator, sizes=sizes, known=known, place=(), kept={})
 
@@ -157,7 +157,7 @@ class Problem:
         own: Sequence[str],
         sized: Callable[[Parameter | None], tuple[float, float]],
     ) -> Discrepancy:
-        """Return the discrepancy that a model leaves, of which the effects that are its own are no part."""
+        """Return the discrepancy that a model leaves; of the ``own`` effects no small changes are assumed."""
         slopes, sizes = [], []
         for effect, columns in small_sensitivities(self, model).items():
             slopes.append(np.where(effect in own, 0.0, columns))
@@ -180,9 +180,9 @@ class Problem:
         return parameters.physics(parameters.vector(values))
 
     def with_changes_for(self, model: Model, errors: Array) -> Physics:
-        """Return a model's physics record with the small changes that would explain some residuals, shape (1,).
+        """Return a model's physics record with the small changes that explain given residuals best, shape (1,).
 
-        As derivatives at the model have it; ``errors``, shape (n,), need not be the model's own.
+        The residuals ``errors``, shape (n,), need not be the model's own; derivatives at the model are used.
         """
         left = self.estimator.discrepancy
         if left is None:
@@ -251,7 +251,7 @@ class Problem:
         return np.clip(lowest, -room, -LEAST_ROOM), np.clip(highest, LEAST_ROOM, room)
 
     def with_its_clocks(self, held: Residuals, physics: Physics) -> Residuals:
-        """Return recordings set aside with their cameras' clocks fitted under a robot, where those here were."""
+        """Return recordings set aside, their camera clocks fitted under a robot's physics if this problem's were."""
         return with_fitted_clocks(held, physics)[0] if self.clocks_fitted and not held.sensor else held
 
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:

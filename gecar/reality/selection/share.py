@@ -78,7 +78,7 @@ def share_asked_for(index: ResidualIndex, without: Array, with_effect: Array) ->
 
 
 def least_share_expected(index: ResidualIndex, errors: Array, change: Array, sure: float) -> float:
-    """Return the lower bound of the share that recordings would ask for of an effect that is right; -inf: unseen.
+    """Return the lower bound of `share_asked_for` to expect for an effect that is right; -inf where it does not show.
 
     Parameters
     ----------

@@ -19,10 +19,9 @@ from gecar.reality.selection.acceptance import (
     imitates_dry_friction,
     is_material,
     is_worthwhile,
+    most_uneven,
     proved,
-    stands_out,
     stopped,
-    unevenness,
 )
 from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.homogeneity import drifts
@@ -184,8 +183,7 @@ def _standing_beside(
     hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
     if len(kept) < len(steps) or not hardly:
         return kept
-    imitating = [step for step in kept if not stands_out(problem, step)]
-    worst = max(imitating, key=lambda step: unevenness(problem, step), default=None)
+    worst = most_uneven(problem, kept)
     return [step for step in kept if step is not worst]
 
 
@@ -247,7 +245,7 @@ class _Chain:
 def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Chain | None = None) -> _Chain:
     """Continue a chain until nothing more proves itself; the problem is under what its model leaves.
 
-    It also ends, as the other one, where it has come to the same effects as another chain had.
+    Where it has come to the effects that another chain began with, it would go on like that one, which is returned.
     """
     model, steps, tried = begun.model, list(begun.steps), list(begun.tried)
     here, stage = problem, tuple(first)

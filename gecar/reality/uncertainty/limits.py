@@ -104,7 +104,7 @@ class _Search:
         self._k = next(k for k, c in enumerate(coordinates) if c.effect.id == effect)
 
     def limit(self) -> Limit | None:
-        """Return it: the larger of both sides of neutral, at nine of ten places."""
+        """Return the limit: the larger of those on both sides of neutral, which holds at nine of ten places."""
         c = self._parameters.coordinates[self._k]
         low, high = (float(bound[self._k]) for bound in self._parameters.bounds)
         least = self._problem.share(c.parameter)
@@ -116,7 +116,7 @@ class _Search:
         return Limit(float(c.value(z) if c.inverse else abs(c.value(z) - c.neutral)), c.parameter.unit)
 
     def _shapes(self) -> list[Array]:
-        """Return the model's coordinates with the effect's shape: as searches begin, or at several places."""
+        """Return coordinate vectors that differ in the effect's other parameters, such as the place of a patch."""
         problem, model, effect = self._problem, self._model, self._effect
         tried: Sequence[Mapping[str, float]] = ()
         if BY_ID[effect].at_a_place:
@@ -127,7 +127,7 @@ class _Search:
         return [self._parameters.vector({**model.values, effect: values}) for values in tried or ({},)]
 
     def _smallest(self, start: Array, side: float) -> float:
-        """Return the smallest value of the coordinate, on one side of neutral, that would be named; infinite: none."""
+        """Return the smallest coordinate on one side of neutral at which the effect would be named; infinite: none."""
         k, coordinate = self._k, self._parameters.coordinates[self._k]
         low, high = (float(bound[k]) for bound in self._parameters.bounds)
         scale = side * (1.0 if not coordinate.inverse else high / LARGEST)
@@ -146,17 +146,17 @@ class _Search:
         return math.inf
 
     def _tried(self, vectors: Array) -> Iterator[tuple[float, Array]]:
-        """Yield of each vector but the first, neutral one how much more than must shows, and the change it makes."""
+        """Yield the margin (`_margins`) and the change of residuals of each vector after the first, neutral one."""
         errors = self._problem.residuals.errors_of_each
         none = errors(self._parameters.physics(vectors[:1]))[0]
         for first in range(1, len(vectors), AT_ONCE):  # most limits are small
             changes = errors(self._parameters.physics(vectors[first : first + AT_ONCE])) - none
-            yield from zip(self._seen(changes).tolist(), changes, strict=True)
+            yield from zip(self._margins(changes).tolist(), changes, strict=True)
 
-    def _seen(self, changes: Array) -> Array:
-        """Return how many times as much of changes of residuals, shape (sizes, n), shows as must; shape (sizes,).
+    def _margins(self, changes: Array) -> Array:
+        """Return by which factors changes of residuals, shape (sizes, n), exceed what is needed; shape (sizes,).
 
-        Large changes count as in costs. What of a change a rival makes up for is no reason to name this effect.
+        Needed are `NEEDED` in all, and `APART` beside what the best rival explains. Large changes count as in costs.
         """
         changes = self._problem.estimator.whitened(changes)
         squares = np.sum(changes**2, axis=1)
@@ -168,7 +168,7 @@ class _Search:
         return np.asarray(np.minimum(shown / NEEDED, own * shown / APART))
 
     def _confirmed(self, without: Array, with_it: Array, change: Array) -> float:
-        """Return by how many times recordings set aside pass what confirms an effect, which makes this change.
+        """Return by which factor recordings set aside exceed what is needed to confirm an effect of one size.
 
         The share of it that they ask for is 1, give or take its standard deviation; with the small changes that make up
         for it where it is absent, or without them. An effect that they do not show must show in two others.
