@@ -302,20 +302,22 @@ def _with_constants_of(written: Written, first: Explanation) -> tuple[Invented, 
         fixed = {name: value for name, value in term.constants.items() if name not in known}
         known |= {name: Interval(value, value, value, "") for name, value in fixed.items()}
     told = zip(written.invented, written.terms, intervals, strict=True)
-    return tuple(replace(law, term=term, parameters=found) for law, term, found in told)
+    return tuple(
+        replace(law, term=term, parameters=found, looks_like=looks_like(term)) for law, term, found in told
+    )
 
 
 def _told(
     library: Library, law: Law, others: Sequence[Law], proof: Proof, held_gain: float
 ) -> list[Invented]:
-    """Return what the verdict says of each term of a law, but for its constants."""
+    """Return what the verdict says of each term of a law, but for its constants and the words that tell them."""
     problem, physics = library.problem, law.parameters.physics(law.minimum.z)
     return [
         Invented(
             term=term,
             alternatives=tuple(each for other in others for each in other.terms),
             parameters={},
-            looks_like=looks_like(term),
+            looks_like="",
             holdout_gain=held_gain,
             left_out_gain=proof.gain,
             null_95=proof.null_95,
