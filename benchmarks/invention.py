@@ -26,8 +26,9 @@ from benchmarks.concealed.sizes import is_material, sizes_in
 from gecar.files import json_ready, write_whole
 from gecar.reality.discovery import discover
 from gecar.reality.invent.sentences import physics_grammar
+from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.recordings.recording import read_case
-from gecar.reality.verdict import Verdict
+from gecar.reality.verdict import Judgement, Verdict
 from gecar.report.table import piped
 from gecar.world.effects import CATALOGUE
 from gecar.world.robot import write_robot
@@ -52,6 +53,11 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "torque_ripple": (_MOTOR, ("angle",)),
     "speed_limit": (_MOTOR, ("speed",)),
     "wheel_radius": (("rolling_radius",), ("",)),
+    "backlash": (("gear_play",), ("",)),
+    "track_width": (("track_width",), ("",)),
+    "sensor_position": (("sensor_ahead", "sensor_aside"), ("",)),
+    "sensor_delay": (("sensor_ahead", "sensor_aside"), ("ahead", "turn_rate")),
+    "line_shift": (("sensor_ahead", "sensor_aside"), ("heading",)),
     "wheel_radius_difference": (("rolling_radius",), ("side",)),
     "tyre_friction": (("tyre_grip", "wheel_load"), ("",)),
     "slippery_patch": (("tyre_grip", "wheel_load"), ("x", "y")),
@@ -76,7 +82,7 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "ambient_light": (("colour_reading",), ("heading",)),
     "pose_drift": (("pose_x", "pose_y", "pose_heading"), ("time",)),
     "motor_heat": (("motor_torque", "supply_voltage", "command"), ("store", "time")),
-    "loosening_wheel": (("rolling_radius",), ("time",)),
+    "loosening_wheel": (("gear_play",), ("time",)),
     "current_limit": (("motor_torque", "command"), ("current",)),
     "yaw_pull": (("yaw_moment",), ("",)),
     "shared_drop": (("supply_voltage",), ("draw", "current", "command")),
@@ -87,10 +93,9 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "rubber_band": (_MOTOR, ("angle",)),
     "hopping_wheel": (("tyre_grip", "wheel_load"), ("angle",)),
     "coasting": (_MOTOR, ("command", "speed")),
+    "swinging_sensor": (("sensor_ahead", "sensor_aside"), ("ahead", "turn_rate")),
     "swivel_caster": (("force_aside", "yaw_moment"), ("turn_rate", "ahead", "aside")),
 }
-NO_PORT = ("swinging_sensor",)
-"""A place that swings: no port moves the sensor."""
 NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""
 
@@ -130,12 +135,28 @@ def look_at(folder: Path, label: dict[str, Any], out: Path, seed: int = 0) -> di
             "material": verdict.residual.material,
             "clocks_fitted": verdict.evidence.motion.problem.clocks_fitted,
             "gap_closed": verdict.judgement.gap_closed,
+            "gap_closed_at_best": closed_at_best(verdict, label) if concealed and not outside else None,
             "invented": table["invented"],
             "typeset": [law.term.typeset for law in verdict.invented],
             "seconds": time.process_time() - began[0],
             "wall_s": time.perf_counter() - began[1],
         }
     )
+
+
+def closed_at_best(verdict: Verdict, label: dict[str, Any]) -> float | None:
+    """Return the gap that the concealed effects close at their true sizes, as the catalogue describes them.
+
+    The rest is the case's background, and where the catalogue's law is not that of the world.
+    """
+    evidence, judgement = verdict.evidence, verdict.judgement
+    true = {
+        effect["id"]: {name: number["value"] for name, number in effect["parameters"].items()}
+        for effect in label["effects"]
+    }
+    best = Contender(evidence.before.with_effects(true), evidence.held)
+    channels = judge(Contender(evidence.before, evidence.held_before), best)
+    return Judgement(judgement.recordings, judgement.by_time, channels).gap_closed
 
 
 def asks_for_a_law(label: dict[str, Any]) -> bool:
@@ -167,14 +188,17 @@ def variables_right(case: dict[str, Any]) -> bool | None:
 
 def table(cases: dict[str, dict[str, Any]]) -> str:
     """Write a case a row, and what they come to."""
-    rows = [["case", "concealed", "verdict", "named", "laws", "gap closed", "port", "CPU s"]]
+    rows = [["case", "concealed", "verdict", "named", "laws", "gap closed", "at best", "port", "CPU s"]]
     for name, case in sorted(cases.items(), key=lambda item: (item[1]["kind"], item[1]["concealed"])):
-        closed = "-" if case["gap_closed"] is None else f"{case['gap_closed']:.2f}"
+        closed, best = (
+            "-" if case.get(name) is None else f"{case[name]:.2f}"
+            for name in ("gap_closed", "gap_closed_at_best")
+        )
         port = {None: "-", True: "yes", False: "no"}[port_right(case)]
         laws = "; ".join(f"`{words}`" for words in case["typeset"]).replace("|", "\\|") or "-"
         named = ", ".join(case["effects"]) or "-"
         what = case["concealed"] or "nothing"
-        rows.append([name, what, case["verdict"], named, laws, closed, port, f"{case['seconds']:.0f}"])
+        rows.append([name, what, case["verdict"], named, laws, closed, best, port, f"{case['seconds']:.0f}"])
     return piped(rows) + "\n" + _summary(list(cases.values()))
 
 
@@ -187,6 +211,13 @@ def _summary(cases: list[dict[str, Any]]) -> str:
         written = sum(bool(c["invented"]) for c in lawful if c["kind"] == kind)
         of = sum(c["kind"] == kind for c in lawful)
         middle = f"{np.median(closed):.2f}" if closed else "-"
+        best = [
+            each
+            for c in written_in
+            if c["kind"] == kind and (each := c.get("gap_closed_at_best")) is not None
+        ]
+        if best:
+            middle += f" (the effect itself: {np.median(best):.2f})"
         lines.append(
             f"{kind}: a law in {written} of {of} that have a port; gap closed there, median {middle}"
         )

@@ -310,7 +310,7 @@ def test_a_pass_that_takes_no_time_polls_when_it_is_asked_next():
 
 
 def test_of_all_that_is_outside_the_catalogue_it_is_said_where_laws_of_it_stand():
-    said = {*invention.PORTS_OF, *invention.NO_LAW, *invention.NO_PORT}
+    said = {*invention.PORTS_OF, *invention.NO_LAW}
     assert {*OUTSIDE, *SEALED} <= said
     assert said <= {*OUTSIDE, *SEALED, *(effect.id for effect in CATALOGUE)}
 

@@ -30,6 +30,7 @@ from gecar.reality.invent.proof import left_out_gains, simplified
 from gecar.reality.invent.search import Library, fit
 from gecar.reality.invent.sentences import (
     complexity,
+    elsewhere,
     joined,
     key,
     physics_grammar,
@@ -443,6 +444,11 @@ def test_sums_are_taken_apart_and_put_together():
          "grows over the first 30 s of use and stays: heat"),
         ({"port": "command", "law": "c1 * (store - command)", "c1": 2.0, "store": "command", "store_s": 0.03},
          "commands that act late, by about 60 ms"),
+        ({"port": "command", "law": "c1 * (store - command)", "c1": 1.0, "store_s": 0.025,
+          "store": "store + max(-0.05, min(0.05, command - store))"}, "commands that ramp, at 200 % a second"),
+        ({"port": "gear_play", "law": "c1 * time", "c1": 0.01, "side": "right"},
+         "a wheel that comes loose, on the right wheel alone"),
+        ({"port": "sensor_ahead", "law": "c1 * ahead", "c1": -0.02}, "a colour sensor that is late, by about 20 ms"),
         ({"port": "pose_y", "law": "c1 * ahead * sin(heading)", "c1": -0.04}, "a camera that is late, by about 40 ms"),
         ({"port": "colour_reading", "law": "c1 * reading * cos(heading)", "c1": 0.1}, "light that comes from one side"),
         ({"port": "pose_toward", "law": "c1 * distance * distance ** 2", "c1": 0.1, "at_x": 1.2, "at_y": 0.6},
@@ -452,6 +458,13 @@ def test_sums_are_taken_apart_and_put_together():
 )  # fmt: skip
 def test_what_a_law_looks_like(table, words):
     assert words in looks_like(Term(**table))
+
+
+def test_the_laws_elsewhere_are_those_at_other_ports():
+    ports = [laws[0].port for laws in single_laws(elsewhere(FEW, ["supply_voltage"]))]
+    assert "supply_voltage" not in ports
+    assert set(ports) == {laws[0].port for laws in single_laws(FEW)} - {"supply_voltage"}
+    assert elsewhere(HIDDEN_FROM_DERIVATIVES, ["tyre_grip", "wheel_load", "command", "motor_torque"]) is None
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ AVERAGED = spot_average(RASTER, PITCH, EV3.colour_sensor.spot_diameter)
 def seen(x, y, heading=0.0, robot=EV3):
     state = np.zeros(1, STATE)
     place(state[0], robot.physics[0], x, y, heading)
-    return glance(AVERAGED, PITCH, state[0], 0.0, robot.physics[0])
+    return glance(AVERAGED, PITCH, state[0], 0.0, 0.0, robot.physics[0])
 
 
 def covered(offset, radius=0.004):
@@ -57,14 +57,14 @@ def test_both_ways_to_average_agree():
     physics = EV3.physics[0]
     for _ in range(200):
         x, heading = rng.uniform(0.05, 0.12), rng.uniform(-0.3, 0.3)
-        slow = spot_reflection(RASTER, PITCH, x, 0.6, np.cos(heading), np.sin(heading), 0.0, physics)
+        slow = spot_reflection(RASTER, PITCH, x, 0.6, np.cos(heading), np.sin(heading), 0.0, 0.0, physics)
         assert seen(x, 0.6, heading) == pytest.approx(slow, abs=1.5)
 
 
 def spot_seen(x, y, heading=0.0, robot=EV3):
     """What `seen` gives, as fits see it: the spot averaged on the way."""
     cos, sin = np.cos(heading), np.sin(heading)
-    return spot_reflection(RASTER, PITCH, x, y, cos, sin, 0.0, robot.physics[0])
+    return spot_reflection(RASTER, PITCH, x, y, cos, sin, 0.0, 0.0, robot.physics[0])
 
 
 @pytest.mark.parametrize("look", [seen, spot_seen])
@@ -104,7 +104,7 @@ def test_a_larger_spot_blurs_the_edge_in_drives_and_in_fits(offset_mm):
     expected = pytest.approx(100.0 * (1.0 - covered(offset_mm / 1000.0, 0.012)), abs=1.6)
     state, floor = np.zeros(1, STATE), World(large, PAPER).floor
     place(state[0], large.physics[0], x, 0.6, 0.0)
-    assert glance(floor.averaged, floor.pitch, state[0], 0.0, large.physics[0]) == expected
+    assert glance(floor.averaged, floor.pitch, state[0], 0.0, 0.0, large.physics[0]) == expected
     assert spot_seen(x, 0.6, 0.0, large) == expected
 
 

@@ -46,6 +46,10 @@ def effect(name, **values):
 SAME = [
     (effect("wheel_radius", scale=1.05), law("rolling_radius", "a", a=0.05), 1e-9),
     (effect("wheel_radius_difference", right_minus_left=0.04), law("rolling_radius", "a * side", a=0.02), 1e-9),
+    (effect("command_slew", rate_pct_s=200.0),
+     law("command", "store - command", store="store + max(-0.05, min(0.05, command - store))", store_s=0.025), 0.03),
+    (effect("backlash", angle_deg=4.0), law("gear_play", "a", a=math.radians(4.0)), 1e-9),
+    (effect("track_width", scale=1.05), law("track_width", "a", a=0.05), 1e-9),
     (effect("coulomb_friction", torque_nm=NOMINAL.motor.coulomb_friction + 0.01),
      law("gear_friction", "a", a=0.01), 1e-9),
     (effect("viscous_friction", coefficient_nms=0.002), law("motor_torque", "-b * speed", b=0.002), 0.04),
@@ -144,6 +148,16 @@ def test_an_error_of_the_colour_sensor_turns_another_way():
         simulate(World(r, course), FOLLOW, trace=True) for r in (NOMINAL, law("colour_reading", "-100"))
     )
     assert (plain.trace["line"][5], blind.trace["line"][5]) == (2.0, 4.0)
+
+
+def test_a_sensor_that_a_law_moves_sees_what_one_that_sits_there_does():
+    course = load_course("paper")
+    sensor = NOMINAL.colour_sensor
+    ahead = effect("sensor_position", ahead_m=sensor.ahead + 0.01, left_m=sensor.left)
+    left = effect("sensor_position", ahead_m=sensor.ahead, left_m=sensor.left + 0.01)
+    for moved, port in ((ahead, "sensor_ahead"), (left, "sensor_aside")):
+        one, other = (simulate(World(r, course), FOLLOW, trace=True) for r in (moved, law(port, "0.01")))
+        assert np.array_equal(one.trace["reflection_pct"], other.trace["reflection_pct"])
 
 
 @pytest.mark.parametrize("port", PORTS, ids=lambda port: port.id)

@@ -23,6 +23,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
 from gecar.reality.invent.invention import invent
+from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
@@ -72,6 +73,7 @@ from gecar.world.terms import Term
 
 Spans = Mapping[str, Mapping[str, Interval]]
 
+OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 INSTEAD = 0.7  # of what effects and laws beside them leave: laws in their place must leave less
 
@@ -340,7 +342,8 @@ def _explain_sensor(
         return None
     if motion.unexplained:  # a camera that errs says nothing of where the line lies
         known_place = tuple(effect for effect in context.catalogue if "pose" not in effect.needs)
-        context = replace(context, catalogue=known_place)
+        language = context.language and elsewhere(context.language, OF_THE_MOUNT)
+        context = replace(context, catalogue=known_place, language=language)
     # A late camera and a skewed clock shift what is read, too.
     known = motion.taken.parameters.robot.with_effects(motion.taken.values)
     beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()

@@ -15,9 +15,10 @@ MOST_CONSTANTS = 6
 MOST_TOKENS = 32
 MOST_STORE_TOKENS = 16
 # A term's row of numbers: port, which side (-1: both, 0: left, 1: right), how many tokens law and store have, the
-# store's time constant [s], a point on the floor [m], constants, then the tokens themselves.
-PORT, SIDE, LENGTH, STORE_LENGTH, STORE_S, AT_X, AT_Y = range(7)
-CONSTANTS = 7
+# store's time constant [s], a point on the floor [m], whether the store's law looks at the store itself, constants,
+# then the tokens themselves.
+PORT, SIDE, LENGTH, STORE_LENGTH, STORE_S, AT_X, AT_Y, OF_ITSELF = range(8)
+CONSTANTS = 8
 LAW = CONSTANTS + MOST_CONSTANTS
 STORE_LAW = LAW + MOST_TOKENS
 TERM_WIDTH = STORE_LAW + MOST_STORE_TOKENS
@@ -132,6 +133,8 @@ PORTS: tuple[Port, ...] = (
     Port("force_y", "N", "a force along y", False, 1.0),
     Port("force_toward", "N", "a pull toward a point on the floor", False, 1.0, (*_MOVING, "distance")),
     Port("yaw_moment", "N m", "a turning moment on the body", False, 0.1),
+    Port("gear_play", "rad", "play between the gears and the wheel", True, 0.1),
+    Port("track_width", "-", "a share of the distance between the wheels", False, 0.1),
     Port("encoder_reading", "rad", "an error of the encoder", True, 0.1, ("time", "angle", "speed", "side"),
          "encoders", True),
     Port("gyro_reading", "rad/s", "an error of the gyro", False, 0.2, _SEEN, "gyro"),
@@ -142,6 +145,8 @@ PORTS: tuple[Port, ...] = (
          ("time", "x", "y", "heading", "reading"), "colour"),
     Port("pose_toward", "m", "an error of the camera toward a point on the floor", False, 0.05, (*_SEEN, "distance"),
          "camera"),
+    Port("sensor_ahead", "m", "a shift of the colour sensor to the front", False, 0.02, _SEEN, "colour"),
+    Port("sensor_aside", "m", "a shift of the colour sensor to the left", False, 0.02, _SEEN, "colour"),
 )  # fmt: skip
 PORT_NUMBER = {port.id: number for number, port in enumerate(PORTS)}
 TOWARD_A_POINT = ("force_toward", "pose_toward")

@@ -49,6 +49,7 @@ from gecar.world.ports import (
     MOST_STORE_TOKENS,
     MOST_TOKENS,
     N_TERMS,
+    OF_ITSELF,
     OF_TWO,
     OPERATOR,
     OPERATORS,
@@ -297,7 +298,7 @@ class Term(BaseModel):
             len(law),
             len(store),
         )
-        row[STORE_S] = self.store_s
+        row[STORE_S], row[OF_ITSELF] = self.store_s, float("store" in self._store_law.variables)
         row[AT_X], row[AT_Y] = (self.constants.get(name, 0.0) for name in POINT)
         for number, name in enumerate(self.free):
             row[CONSTANTS + number] = self.constants[name]
@@ -323,16 +324,17 @@ class Term(BaseModel):
     @property
     def typeset(self) -> str:
         """The term as a formula with its numbers: ``motor_torque = -0.00012 speed |speed| [N m]``."""
-        formula = self.law
+        formula, filling = self.law, self.store
         for name, value in self.constants.items():
-            formula = re.sub(rf"\b{name}\b", f"{value:.3g}", formula)
+            formula, filling = (re.sub(rf"\b{name}\b", f"{value:.3g}", each) for each in (formula, filling))
         side = "" if self.side == "both" else f" ({self.side} wheel)"
         unit = "" if self.unit == "-" else f" [{self.unit}]"
         words = f"{self.port}{side} = {_pretty(formula)}{unit}"
-        if self.store:
-            words += (
-                f", where store follows {_pretty(self.store)} with a time constant of {self.store_s:.3g} s"
-            )
+        if filling.startswith("store + "):
+            change = _pretty(filling.removeprefix("store + "))
+            words += f", where store changes by {change} every {self.store_s:.3g} s"
+        elif self.store:
+            words += f", where store follows {_pretty(filling)} with a time constant of {self.store_s:.3g} s"
         if "at_x" in self.constants:
             words += f", from ({self.constants['at_x']:.2f}, {self.constants['at_y']:.2f}) m"
         return words

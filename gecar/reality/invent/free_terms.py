@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -20,6 +21,7 @@ Array = npt.NDArray[np.float64]
 INNER_STEP = 0.1  # of an inner constant's size: one coordinate
 POINT_STEP_M = 0.05
 FARTHEST = 20.0  # coordinates of an inner constant: from a sixth of its size to six times
+SHORTEST_S = 0.01  # of a store's time constant: five steps, so that the law does the same at half the step
 PROBE = 0.1  # step of finite differences, in coordinates
 _STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
 _TURN = re.compile(r"\b(?:sin|cos)\(\w+ \* angle\)")
@@ -43,6 +45,10 @@ class Constant:
     def at(self, z: Any) -> Any:
         """Return the constant at coordinates."""
         return self.value * np.exp(self.step * z) if self.ratio else self.value + self.step * z
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate at which a constant that runs as its logarithm has a value."""
+        return math.log(value / self.value) / self.step
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,10 @@ class FreeTerms:
         reach = np.array(
             [FARTHEST if c.name not in linear(self.terms[c.term]) else np.inf for c in self.constants]
         )
-        return np.r_[low, -reach], np.r_[high, reach]
+        shortest = np.array(
+            [c.coordinate(SHORTEST_S) if c.slot == STORE_S else -np.inf for c in self.constants]
+        )
+        return np.r_[low, np.maximum(-reach, shortest)], np.r_[high, reach]
 
     @property
     def probes(self) -> Array:

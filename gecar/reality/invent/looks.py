@@ -27,6 +27,7 @@ _RATES = (
     ("pose_x", "ahead * cos(heading)"),
     ("pose_y", "ahead * sin(heading)"),
     ("pose_heading", "turn_rate"),
+    ("sensor_ahead", "ahead"),
 )
 _KNOWN = (
     _Known(_TORQUE, r"speed \* abs\(speed\)", "drag growing with the square of the wheel's speed",
@@ -61,6 +62,17 @@ _KNOWN = (
     _Known(("yaw_moment",), r"turn_rate", "drag on turning", "a push on turning"),
     _Known(("yaw_moment",), r"sign\(turn_rate\)", "a caster that rubs when the robot turns", "a push on turning"),
     _Known(("yaw_moment",), r"1", "a constant pull to the right", "a constant pull to the left"),
+    _Known(("gear_play",), r"1", "less play than the robot's file says", "play in the gears"),
+    _Known(("gear_play",), r"time", "a wheel that gets tighter", "a wheel that comes loose"),
+    _Known(("track_width",), r"1", "wheels closer together", "wheels farther apart"),
+    _Known(("sensor_ahead",), r"1", "a colour sensor that sits farther back",
+           "a colour sensor that sits farther ahead"),
+    _Known(("sensor_aside",), r"1", "a colour sensor that sits farther right",
+           "a colour sensor that sits farther left"),
+    _Known(("sensor_aside",), r"turn_rate", "a colour sensor that reads late when the robot turns",
+           "a colour sensor that reads early when the robot turns"),
+    _Known(("sensor_ahead", "sensor_aside"), r"(cos|sin)\(heading\)", "a line that lies elsewhere",
+           "a line that lies elsewhere"),
     _Known(("force_x",), r"1", "a pull toward -x: a floor that is not level",
            "a pull toward +x: a floor that is not level"),
     _Known(("force_y",), r"1", "a pull toward -y: a floor that is not level",
@@ -80,7 +92,7 @@ _KNOWN = (
 
 def looks_like(term: Term) -> str:
     """Return what a law looks like: its name where it is a known one, or else what it adds and on what that depends."""
-    for say in (_spring, _lens, _once_per_turn, _late, _stored, _named):
+    for say in (_spring, _lens, _once_per_turn, _late, _ramped, _stored, _named):
         words = say(term)
         if words:
             return words + _where(term)
@@ -163,10 +175,21 @@ def _late(term: Term) -> str:
     if term.port == "command" and shape == "(store - command)" and term.store == "command":
         late_s, what = value * term.store_s, "commands that act"
     elif (term.port, shape) in _RATES:
-        late_s, what = -value, "a camera that is"
+        late_s, what = (
+            -value,
+            "a colour sensor that is" if term.port == "sensor_ahead" else "a camera that is",
+        )
     else:
         return ""
     return f"{what} {'late' if late_s > 0.0 else 'early'}, by about {1e3 * abs(late_s):.0f} ms"
+
+
+def _ramped(term: Term) -> str:
+    """Name a limit of how fast commands change: a store that moves toward them by so much at the most."""
+    most = re.fullmatch(r"store \+ max\(-(\w+), min\((\w+), command - store\)\)", term.store)
+    if not most:
+        return ""
+    return f"commands that ramp, at {100.0 * term.constants[most[1]] / term.store_s:.0f} % a second"
 
 
 def _stored(term: Term) -> str:

@@ -203,16 +203,24 @@ def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Gra
     InputError
         If it has none there.
     """
-    numbers = []
-    for number in range(len(grammar.rules[0].productions)):
-        names = _first(grammar, number).partition(":")[0].split(" and ")
-        if len(names) <= most and all(name.strip() in ports for name in names):
-            numbers.append(number)
+    numbers = [k for k, names in enumerate(_ports_of(grammar)) if len(names) <= most and names <= set(ports)]
     if not numbers:
         raise expected(
             grammar.source, "no law that can show in these recordings", f"laws at {', '.join(ports)}"
         )
     return _only(grammar, numbers)
+
+
+def elsewhere(grammar: Grammar, ports: Sequence[str]) -> Grammar | None:
+    """Return a grammar of laws at all ports but some; None if it has none there."""
+    numbers = [k for k, names in enumerate(_ports_of(grammar)) if not names & set(ports)]
+    return _only(grammar, numbers) if numbers else None
+
+
+def _ports_of(grammar: Grammar) -> list[set[str]]:
+    """Return the ports of each of the start's alternatives."""
+    firsts = (_first(grammar, number) for number in range(len(grammar.rules[0].productions)))
+    return [{name.strip() for name in first.partition(":")[0].split(" and ")} for first in firsts]
 
 
 def _first(grammar: Grammar, number: int) -> str:

@@ -64,10 +64,17 @@ def states(run: RecordingResiduals, physics: Physics, term: Term) -> dict[str, A
 def _filled(term: Term, found: Mapping[str, Array], t: Array) -> Array:
     if not term.store:
         return np.zeros((len(t), 2))
-    filling = Term(**{**term.as_table(), "law": term.store, "store": "", "side": "both"})
-    keep = float(np.exp(-np.median(np.diff(t)) / term.store_s))
-    out: Array = lfilter([1.0 - keep], [1.0, -keep], filling.value(found), axis=0)
-    return out
+    filling = Term(**{**term.as_table(), "law": term.store, "side": "both"})
+    step_s = float(np.median(np.diff(t)))
+    if "store" not in filling.parsed.variables:
+        keep = float(np.exp(-step_s / term.store_s))
+        out: Array = lfilter([1.0 - keep], [1.0, -keep], filling.value(found), axis=0)
+        return out
+    stored, share = np.zeros((len(t) + 1, 2)), min(step_s / term.store_s, 1.0)
+    for k in range(len(t)):
+        row = {name: values[k] for name, values in found.items()}
+        stored[k + 1] = stored[k] + share * (filling.value({**row, "store": stored[k]}) - stored[k])
+    return stored[1:]
 
 
 def ranges(

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from gecar.compiled import compiled
 from gecar.world.kernel.sensing import spot_reflection
-from gecar.world.kernel.terms import colour_error
+from gecar.world.kernel.terms import colour_error, sensor_shift
 
 Array = npt.NDArray[np.float64]
 
@@ -85,14 +85,25 @@ def readings_along(
     for i in range(t.shape[0]):
         k = _along(t, path, t[i] + late - p.sensor_delay, k, pose)
         heading = pose[2] + shift[2]
+        cos, sin = math.cos(heading), math.sin(heading)
+        front = left = 0.0
+        if p.n_terms > 0.0:
+            per_s = 1.0 / (t[k + 1] - t[k])
+            vx, vy = per_s * (path[k + 1, 0] - path[k, 0]), per_s * (path[k + 1, 1] - path[k, 1])
+            turn_rate = per_s * (path[k + 1, 2] - path[k, 2])
+            x, y = pose[0] + shift[0], pose[1] + shift[1]
+            front, left = sensor_shift(
+                t[i], x, y, heading, vx * cos + vy * sin, vy * cos - vx * sin, turn_rate, p
+            )
         seen = spot_reflection(
             raster,
             pitch,
             pose[0] + shift[0],
             pose[1] + shift[1],
-            math.cos(heading),
-            math.sin(heading),
-            0.0,
+            cos,
+            sin,
+            front,
+            left,
             p,
         )
         if i == 0 or p.sensor_lag <= 0.0:

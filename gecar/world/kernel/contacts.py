@@ -82,15 +82,18 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
     right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
     side_slip = -(s.w + s.yaw_rate * c.axle)
-    plays = effects and c.play > 0.0
-    end_l = separation(left_slip, s.left_push, s.left_play, c.left_radius, c) if plays else left_slip
-    end_r = separation(right_slip, s.right_push, s.right_play, c.right_radius, c) if plays else right_slip
+    plays_l, plays_r = effects and c.left_gap > 0.0, effects and c.right_gap > 0.0
+    end_l, end_r = left_slip, right_slip
+    if plays_l:
+        end_l = separation(left_slip, s.left_push, s.left_play, c.left_gap, c.left_radius, c)
+    if plays_r:
+        end_r = separation(right_slip, s.right_push, s.right_play, c.right_gap, c.right_radius, c)
     # As if both slid: each on its own.
     slide_l, slide_ls = s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip
     slide_r, slide_rs = s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip
     left, left_side, right, right_side = slide_l, slide_ls, slide_r, slide_rs
-    free_l = s.left_slides != 0.0 or (plays and end_l == 0.0)
-    free_r = s.right_slides != 0.0 or (plays and end_r == 0.0)
+    free_l = s.left_slides != 0.0 or (plays_l and end_l == 0.0)
+    free_r = s.right_slides != 0.0 or (plays_r and end_r == 0.0)
     if not free_l and not free_r:
         # Where both hold, they share the side force as they share the load.
         left = s.left_push + (c.m_ll * end_l + c.m_lr * end_r + c.m_ls * side_slip)
@@ -105,25 +108,27 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     elif not free_r:
         right = s.right_push + (c.n_rr * end_r + c.n_rs * side_slip)
         right_side = s.right_side + (c.n_rs * end_r + c.n_rss * side_slip)
-    if plays:
+    if plays_l:
         left, slide_l = _one_way(left, s.left_push, end_l), _one_way(slide_l, s.left_push, end_l)
+    if plays_r:
         right, slide_r = _one_way(right, s.right_push, end_r), _one_way(slide_r, s.right_push, end_r)
     left, left_side, s.left_slides = _within_circle(left, left_side, s.left_circle, slide_l, slide_ls)
     right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
     _push(s, left, right, left_side, right_side, c)
-    return s.left_slides != 0.0 or s.right_slides != 0.0 or plays
+    return s.left_slides != 0.0 or s.right_slides != 0.0 or plays_l or plays_r
 
 
 @kernel
-def separation(slip: float, push: float, play: float, radius: float, c: Any) -> float:
+def separation(slip: float, push: float, play: float, gap: float, radius: float, c: Any) -> float:
     """Return the part of a slip [m/s] that gears and tyre oppose, given where in the play the wheel is.
 
-    The gap leaves the slips that do not close it within the step alone. Without play the slip is returned as it is.
+    The gap, half the play to either side [rad], leaves the slips that do not close it within the step alone. Without
+    one the slip is returned as it is.
     """
-    if c.play == 0.0:
+    if gap == 0.0:
         return slip
-    low = -(c.play + play) * radius / c.dt
-    high = (c.play - play) * radius / c.dt
+    low = -(gap + play) * radius / c.dt
+    high = (gap - play) * radius / c.dt
     if push > 0.0:
         return slip - high
     if push < 0.0:

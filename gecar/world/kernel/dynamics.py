@@ -117,15 +117,15 @@ def step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any,
     p
         Record of dtype `PHYSICS` with the terms.
     c
-        Record of dtype `DERIVED`; terms may change the radii in it.
+        Record of dtype `DERIVED`; terms may change the robot's shape in it.
     stores
         Record of dtype `gecar.world.kernel.terms.STORES`, updated.
     """
     asked = blank(ASKED)
     _enter_step(s, c, True)
     ask(s, left_duty, right_duty, p, c, stores, asked)
-    if asked.radius_terms > 0.0:
-        roll_on(p, asked.left_radius, asked.right_radius, c)
+    if asked.shape_terms > 0.0:
+        _reshape(p, asked, c)
     _force(s, asked, c)
     s.voltage = supply(s, p) + asked.supply_voltage
     _run_motors(s, left_duty + asked.left_command, right_duty + asked.right_command, p, c, True)
@@ -160,6 +160,14 @@ def bench_step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c
         p,
         c,
     )
+
+
+@kernel
+def _reshape(p: Any, asked: Any, c: Any) -> None:
+    """Let the radii, the track and the play be what terms make of them in a step."""
+    roll_on(p, asked.left_radius, asked.right_radius, asked.track, c)
+    c.left_gap = 0.5 * max(p.backlash + asked.left_play, 0.0)
+    c.right_gap = 0.5 * max(p.backlash + asked.right_play, 0.0)
 
 
 @kernel
@@ -288,8 +296,9 @@ def _settle(s: Any) -> None:
 @kernel
 def _close_play(s: Any, c: Any) -> None:
     """Move the play: the wheel rolls with the ground, the shaft with the motor, at most the gap apart."""
-    if c.play > 0.0:
+    if c.left_gap > 0.0:
         left = s.left_play + c.dt * (s.left_speed - (s.u - s.yaw_rate * c.half_track) / c.left_radius)
+        s.left_play = min(max(left, -c.left_gap), c.left_gap)
+    if c.right_gap > 0.0:
         right = s.right_play + c.dt * (s.right_speed - (s.u + s.yaw_rate * c.half_track) / c.right_radius)
-        s.left_play = min(max(left, -c.play), c.play)
-        s.right_play = min(max(right, -c.play), c.play)
+        s.right_play = min(max(right, -c.right_gap), c.right_gap)

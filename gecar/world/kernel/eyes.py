@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gecar.compiled import kernel
 from gecar.random_streams import normal
 from gecar.world.kernel.sensing import RING, delayed, glance, lag_keep, lagged, reported
-from gecar.world.kernel.terms import colour_error
+from gecar.world.kernel.terms import colour_error, sensor_shift
 
 
 class Floor(NamedTuple):
@@ -69,7 +69,13 @@ def _side(sensor: int, p: Any) -> float:
 @kernel
 def see(sensor: int, s: Any, p: Any, floor: Floor) -> float:
     """Return what a colour sensor sees now [%]."""
-    return glance(floor.averaged, floor.pitch, s, _side(sensor, p), p)
+    front, left = 0.0, _side(sensor, p)
+    if p.n_terms > 0.0:
+        ahead, aside = s.vx * s.cos + s.vy * s.sin, s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
+        x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
+        moved = sensor_shift(s.t, x, y, s.heading, ahead, aside, s.yaw_rate, p)
+        front, left = moved[0], left + moved[1]
+    return glance(floor.averaged, floor.pitch, s, front, left, p)
 
 
 @kernel

@@ -76,7 +76,9 @@ def spot_reach(pitch: float, diameter: float) -> float:
 
 
 @kernel
-def glance(averaged: npt.NDArray[np.float32], pitch: float, s: Any, left: float, p: Any) -> float:
+def glance(
+    averaged: npt.NDArray[np.float32], pitch: float, s: Any, front: float, left: float, p: Any
+) -> float:
     """Return what the sensor sees [%], before lag, delay and noise, on a floor averaged by `spot_average`.
 
     Parameters
@@ -85,11 +87,11 @@ def glance(averaged: npt.NDArray[np.float32], pitch: float, s: Any, left: float,
         Brightness, shape (rows, columns); size of a cell [m].
     s, p
         Records of dtypes `STATE` and `PHYSICS`.
-    left
-        How far this sensor sits to the left of its nominal place [m].
+    front, left
+        How far this sensor sits to the front and to the left of its nominal place [m].
     """
     aside = p.sensor_left + left
-    ahead = p.sensor_ahead - p.com_ahead
+    ahead = p.sensor_ahead + front - p.com_ahead
     x = s.x + ahead * s.cos - aside * s.sin - p.line_dx
     y = s.y + ahead * s.sin + aside * s.cos - p.line_dy
     if p.line_angle != 0.0:
@@ -124,6 +126,7 @@ def spot_reflection(
     y: float,
     cos: float,
     sin: float,
+    front: float,
     left: float,
     p: Any,
 ) -> float:
@@ -137,12 +140,12 @@ def spot_reflection(
         Floor, shape (rows, columns), 255 bare and 0 line, row 0 at the bottom; size of a cell [m].
     x, y, cos, sin
         The axle's centre [m] and the heading.
-    left
-        How far this sensor sits to the left of its nominal place [m].
+    front, left
+        How far this sensor sits to the front and to the left of its nominal place [m].
     p
         Record of dtype `PHYSICS`.
     """
-    ahead = p.sensor_ahead
+    ahead = p.sensor_ahead + front
     aside = p.sensor_left + left
     radius = 0.5 * spot_reach(pitch, p.spot_diameter)
     # The course may lie displaced: look where the floor under the spot is drawn.

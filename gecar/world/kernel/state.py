@@ -25,7 +25,8 @@ _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain left_dead right_dead slew torque lean "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
-    "weight caster_static caster_arm transfer_side play tilt_x tilt_y sliding ripple regulator_p regulator_i"
+    "weight caster_static caster_arm transfer_side left_gap right_gap tilt_x tilt_y sliding ripple "
+    "regulator_p regulator_i"
 )
 
 STATE = np.dtype([(field, np.float64) for field in _STATE_FIELDS.split()])
@@ -54,7 +55,6 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.mass = p.mass
     c.inv_mass = 1.0 / p.mass
     c.inv_inertia = 1.0 / p.yaw_inertia
-    c.half_track = 0.5 * p.track_width * p.track_scale
     c.axle = -p.com_ahead
     c.caster = p.caster_ahead - p.com_ahead
     _rotor(p, dt, c)
@@ -66,20 +66,24 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.weight = p.mass * GRAVITY
     c.caster_static = c.weight * p.com_ahead / p.caster_ahead
     c.caster_arm = -p.com_height / p.caster_ahead
-    c.transfer_side = p.com_height / p.track_width / p.track_scale
-    c.play = 0.5 * p.backlash
+    c.left_gap = c.right_gap = 0.5 * p.backlash
     c.tilt_x = GRAVITY * math.sin(p.tilt_x) * dt
     c.tilt_y = GRAVITY * math.sin(p.tilt_y) * dt
     c.sliding = p.coulomb_friction * dt
     c.ripple = p.ripple_amplitude * dt / c.rotor
     c.torque = p.constant_torque * dt / c.rotor
     c.lean = 0.5 * p.viscous_difference * dt / c.rotor
-    roll_on(p, 0.0, 0.0, c)
+    roll_on(p, 0.0, 0.0, 0.0, c)
 
 
 @kernel
-def roll_on(p: Any, left_share: float, right_share: float, c: Any) -> None:
-    """Let the wheels roll on radii that are larger by these shares."""
+def roll_on(p: Any, left_share: float, right_share: float, track_share: float, c: Any) -> None:
+    """Let the wheels roll on radii that are larger, and at a distance that is larger, by these shares."""
+    c.half_track = 0.5 * p.track_width * p.track_scale
+    c.transfer_side = p.com_height / p.track_width / p.track_scale
+    if track_share != 0.0:
+        c.half_track *= max(1.0 + track_share, 0.1)
+        c.transfer_side /= max(1.0 + track_share, 0.1)
     c.left_radius = p.wheel_radius * p.radius_scale * (1.0 - 0.5 * p.radius_difference)
     c.right_radius = p.wheel_radius * p.radius_scale * (1.0 + 0.5 * p.radius_difference)
     if left_share != 0.0 or right_share != 0.0:

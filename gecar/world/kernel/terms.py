@@ -23,6 +23,7 @@ from gecar.world.ports import (
     LAW,
     LENGTH,
     N_TERMS,
+    OF_ITSELF,
     OF_TWO,
     OPERATOR,
     PORT,
@@ -44,7 +45,7 @@ STORES = np.dtype([("of", np.float64, (2, N_TERMS)), ("supply_voltage", np.float
 _ASKED = (
     "left_command right_command supply_voltage left_torque right_torque left_friction right_friction "
     "left_radius right_radius left_load right_load left_grip right_grip "
-    "force_ahead force_aside force_x force_y yaw_moment radius_terms"
+    "force_ahead force_aside force_x force_y yaw_moment left_play right_play track shape_terms"
 )
 ASKED = np.dtype([(field, np.float64) for field in _ASKED.split()])
 """What terms ask for at the ports of the dynamics in a step."""
@@ -60,9 +61,10 @@ assert VARIABLE["draw"] == _DRAW
 
 _PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_LOAD, _PORT_GRIP = range(7)
 _PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
-PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(13, 19)
-_PORT_POSE_TOWARD = 19
-assert PORT_NUMBER["pose_toward"] == _PORT_POSE_TOWARD
+_PORT_PLAY, _PORT_TRACK = 13, 14
+PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(15, 21)
+_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE = range(21, 24)
+assert PORT_NUMBER["sensor_aside"] == _PORT_SENSOR_ASIDE
 
 _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
 _PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
@@ -203,7 +205,8 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
     asked.left_torque = asked.right_torque = asked.left_friction = asked.right_friction = 0.0
     asked.left_radius = asked.right_radius = asked.left_load = asked.right_load = 0.0
     asked.left_grip = asked.right_grip = asked.force_ahead = asked.force_aside = 0.0
-    asked.force_x = asked.force_y = asked.yaw_moment = asked.radius_terms = 0.0
+    asked.force_x = asked.force_y = asked.yaw_moment = asked.track = asked.shape_terms = 0.0
+    asked.left_play = asked.right_play = 0.0
     for k in range(int(laws.n_terms)):
         port = int(laws.terms[k, PORT])
         if port >= PORT_ENCODER:
@@ -221,6 +224,7 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
             _PORT_FORCE_X,
             _PORT_FORCE_Y,
             _PORT_YAW,
+            _PORT_TRACK,
         ):
             _add_whole(asked, port, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2))
         else:
@@ -228,11 +232,22 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
                 if int(laws.terms[k, SIDE]) in (BOTH, hand):
                     _add_of_wheel(asked, port, hand, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand))
         if laws.terms[k, STORE_LENGTH] > 0.0:
-            keep = math.exp(-dt / laws.terms[k, STORE_S])
-            for hand in range(2):
-                goal = _law(laws, k, STORE_LAW, int(laws.terms[k, STORE_LENGTH]), v, hand)
-                stores.of[hand, k] = goal + (stores.of[hand, k] - goal) * keep
+            _fill(laws, k, dt, v, stores)
     stores.supply_voltage = asked.supply_voltage
+
+
+@kernel
+def _fill(laws: Any, k: int, dt: float, v: Any, stores: Any) -> None:
+    """Let a term's store fill for a step.
+
+    It is exact where what the store fills toward stands still, or, of one that looks at itself, where its change does.
+    """
+    keep = math.exp(-dt / laws.terms[k, STORE_S])
+    if laws.terms[k, OF_ITSELF] > 0.0:
+        keep = max(1.0 - dt / laws.terms[k, STORE_S], 0.0)
+    for hand in range(2):
+        goal = _law(laws, k, STORE_LAW, int(laws.terms[k, STORE_LENGTH]), v, hand)
+        stores.of[hand, k] = goal + (stores.of[hand, k] - goal) * keep
 
 
 @kernel
@@ -247,8 +262,11 @@ def _add_whole(asked: Any, port: int, value: float) -> None:
         asked.force_x += value
     elif port == _PORT_FORCE_Y:
         asked.force_y += value
-    else:
+    elif port == _PORT_YAW:
         asked.yaw_moment += value
+    else:
+        asked.shape_terms += 1.0
+        asked.track += value
 
 
 @kernel
@@ -264,12 +282,16 @@ def _add_of_wheel(asked: Any, port: int, hand: int, value: float) -> None:
         asked.left_friction += left
         asked.right_friction += right
     elif port == _PORT_RADIUS:
-        asked.radius_terms += 1.0
+        asked.shape_terms += 1.0
         asked.left_radius += left
         asked.right_radius += right
     elif port == _PORT_LOAD:
         asked.left_load += left
         asked.right_load += right
+    elif port == _PORT_PLAY:
+        asked.shape_terms += 1.0
+        asked.left_play += left
+        asked.right_play += right
     else:
         asked.left_grip += left
         asked.right_grip += right
@@ -320,6 +342,28 @@ def colour_error(time: float, x: float, y: float, heading: float, reading: float
         v.of[each, _TIME], v.of[each, _X], v.of[each, _Y], v.of[each, _HEADING] = time, x, y, heading
         v.of[each, _READING] = reading
     return _reading_error(_PORT_COLOUR, 0, v, laws)
+
+
+@kernel
+def sensor_shift(
+    time: float, x: float, y: float, heading: float, ahead: float, aside: float, turn_rate: float, laws: Any
+) -> tuple[float, float]:
+    """Return how far a robot's terms move its colour sensors to the front and to the left [m].
+
+    Parameters
+    ----------
+    time, x, y, heading
+        When [s] and where [m, m, rad] the robot is.
+    ahead, aside, turn_rate
+        How it moves [m/s, m/s, rad/s].
+    laws
+        Record of dtype `PHYSICS` with the terms.
+    """
+    v = blank(VIEW)
+    for each in range(2):
+        v.of[each, _TIME], v.of[each, _X], v.of[each, _Y], v.of[each, _HEADING] = time, x, y, heading
+        v.of[each, _AHEAD], v.of[each, _ASIDE], v.of[each, _TURN_RATE] = ahead, aside, turn_rate
+    return _reading_error(_PORT_SENSOR_AHEAD, 0, v, laws), _reading_error(_PORT_SENSOR_ASIDE, 0, v, laws)
 
 
 @subroutine
