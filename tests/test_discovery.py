@@ -65,11 +65,11 @@ def test_the_gap_closed_counts_channels_made_worse_and_not_those_that_show_noise
     noise_alone = Misfit(1.0, 1.0, 0.9)
     channels = {
         "x_m": Misfit(1.0, 0.2, 0.1),
-        "heading_deg": Misfit(0.12, 0.18, 0.1),
+        "heading_deg": Misfit(0.3, 0.45, 0.2),
         "battery_v": noise_alone,
     }
     judged = Judgement(("run_07",), False, channels)
-    assert judged.gap_closed == pytest.approx((1.12 - 0.38) / (1.12 - 0.2))
+    assert judged.gap_closed == pytest.approx((8.0 - 0.75) / (9.0 + 0.5))
 
 
 def test_what_a_missing_effect_leaves_on_a_bench_is_not_white() -> None:

@@ -198,12 +198,13 @@ class Judgement:
     def gap_closed(self) -> float | None:
         """Share of the gap to the floor that is closed; None where no channel has a gap to speak of.
 
-        (before - after) / (before - floor), each summed over the channels that have a gap before or after: one that
-        shows noise alone has nothing to close, one that is made worse counts.
+        (before - after) / (before - floor), each summed over the channels that have a gap before or after, in units of
+        the channel's floor: one that shows noise alone has nothing to close, one that is made worse counts, and none
+        counts more because little varies in it.
         """
         seen = [m for m in self.channels.values() if max(m.before, m.after) > VISIBLE * m.floor]
-        gap = sum(m.before - m.floor for m in seen)
-        return sum(m.before - m.after for m in seen) / gap if gap > 0.0 else None
+        gap = sum(m.before / m.floor - 1.0 for m in seen)
+        return sum((m.before - m.after) / m.floor for m in seen) / gap if gap > 0.0 else None
 
     @property
     def failed(self) -> bool:

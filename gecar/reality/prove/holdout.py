@@ -10,20 +10,30 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.noise.sensor_noise import PATH_CAUTION, Noise
+from gecar.reality.optimisation.least_squares import least_squares, row_by_row
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.replay.replayer import Prediction, Replayer, replayer_of
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.selection.thresholds import SMALL
 from gecar.reality.verdict import Misfit
+from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
+Physics = npt.NDArray[Any]
 Correction = Callable[[Replayer, Array, Array], tuple[Array, Array]]  # of a replay's rows and poses
 
 _FIELDS = tuple(
     (field, column)
     for column, (field, _) in COLUMNS.items()
     if field not in ("t_s", "left_duty", "right_duty")
+)
+COURSE_REACH = (
+    2.0 * SMALL
+)  # of the size worth a name: how far the course may lie elsewhere for each robot judged
+AT_AN_EDGE_PCT = (
+    20.0  # errors of readings at an edge, where the course is looked for: they count by their squares
 )
 _ROW = {"left_angle_rad": 0, "right_angle_rad": 1, "battery_v": 2, "yaw_rate_rad_s": 3}
 _POSE = {"x_m": 0, "y_m": 1, "heading_rad": 2}
@@ -58,8 +68,9 @@ class Replayed(NamedTuple):
 def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
     """Compare two robots on recordings neither was fitted to, whole and open loop, by column of the file.
 
-    Each is judged with its own nuisances. The floor is what noise leaves, and on readings the uncertainty of the first
-    robot's path: it is known before anything is fitted.
+    Each is judged with its own nuisances: where its paths began, and where the course lies under the camera, to 3 mm
+    and 3 mrad, for beside an edge a few mm turn white to black. The floor is what noise leaves, and on readings the
+    uncertainty of the first robot's path: it is known before anything is fitted.
     """
     floors = _floors(before.held) if before.held.recordings else {}
     was, now = _errors_by_field(before), _errors_by_field(after)
@@ -76,8 +87,9 @@ def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
 def _errors_by_field(contender: Contender) -> dict[str, Array]:
     """Return measured less simulated over all recordings, by field of a recording."""
     errors: dict[str, list[Array]] = {}
+    seen = _on_its_course(contender)
     for run in contender.held.recordings:
-        for field, values in _errors(run, contender.robot, contender.correction).items():
+        for field, values in _errors(run, contender.robot, seen, contender.correction).items():
             if not np.isnan(getattr(run.recording, field)).all():
                 errors.setdefault(field, []).append(values)
     return {field: np.concatenate(parts) for field, parts in errors.items()}
@@ -90,7 +102,7 @@ def _deviations(held: Residuals, field: str) -> Array:
     return np.concatenate([v - np.nanmean(v) for v in values if not np.isnan(v).all()])
 
 
-def replayed(run: RecordingResiduals, physics: npt.NDArray[Any], start_s: float = np.inf) -> Replayed:
+def replayed(run: RecordingResiduals, physics: Physics, start_s: float = np.inf) -> Replayed:
     """Replay a recording whole and open loop, from the start that fits its poses best.
 
     Parameters
@@ -108,7 +120,33 @@ def replayed(run: RecordingResiduals, physics: npt.NDArray[Any], start_s: float 
     return Replayed(replayer, replayer.play(physics, replayer.aligned_start(physics, within)))
 
 
-def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None) -> dict[str, Array]:
+def _on_its_course(contender: Contender) -> Physics:
+    """Return a robot's physics with the course where its readings fit best, near the place that it is known to have."""
+    physics = contender.robot.physics
+    runs = [run for run in contender.held.recordings if run.reads and run.replayer.has_poses]
+    if not runs:
+        return physics
+    shift = BY_ID["line_shift"].parameters
+
+    def moved(z: Array) -> Physics:
+        there = physics.copy()
+        for parameter, share in zip(shift, z, strict=True):
+            there[parameter.field] += COURSE_REACH * parameter.worthwhile * share
+        return there
+
+    def errors(z: Array) -> Array:
+        there = moved(z)
+        return np.concatenate([np.nan_to_num(_reading_errors(run, there)) for run in runs]) / AT_AN_EDGE_PCT
+
+    ends = np.ones(len(shift))
+    found = least_squares(row_by_row(errors), np.zeros(len(shift)), (-ends, ends), 0.1 * ends)
+    return moved(found.z)
+
+
+def _errors(
+    run: RecordingResiduals, robot: Robot, seen: Physics, correction: Correction | None
+) -> dict[str, Array]:
+    """Return measured less simulated by field; ``seen`` is the robot's physics with the course where it lies."""
     recording, physics = run.recording, robot.physics
     replayer, (rows, _, poses, _) = replayed(run, physics)
     if correction is not None:
@@ -117,16 +155,16 @@ def _errors(run: RecordingResiduals, robot: Robot, correction: Correction | None
     for field, k in _POSE.items():
         out[field] = replayer.inputs.pose[:, k] - poses[:, k]
     if run.reads:
-        out["reflection_pct"] = _reading_errors(run, physics)
+        out["reflection_pct"] = _reading_errors(run, seen)
     return out
 
 
-def reading_error(held: Residuals, physics: npt.NDArray[Any]) -> float:
+def reading_error(held: Residuals, physics: Physics) -> float:
     """Return the root-mean-square error of a robot's simulated readings along the measured paths [%]."""
     return _rms(np.concatenate([_reading_errors(run, physics) for run in held.recordings]))
 
 
-def _reading_errors(run: RecordingResiduals, physics: npt.NDArray[Any]) -> Array:
+def _reading_errors(run: RecordingResiduals, physics: Physics) -> Array:
     return np.asarray(run.recording.reflection_pct - run.readings(physics))
 
 
