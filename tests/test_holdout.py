@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 from concealing import EV3
 from test_location import seen_on_the_course
 
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove.holdout import Contender, judge
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.recordings.split import hold_out
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.world.robot import Robot
@@ -17,8 +21,8 @@ RUNS = [seen_on_the_course(seed, EV3) for seed in (0, 4)]  # the second crosses 
 NOISE = estimate_noise(RUNS, EV3.physics, 1.0)
 
 
-def contender(robot: Robot) -> Contender:
-    return Contender(robot, motion_residuals(RUNS, NOISE, 1.0, Threads(1)).with_paths(robot.physics))
+def contender(robot: Robot, runs: Sequence[Recording] = RUNS) -> Contender:
+    return Contender(robot, motion_residuals(runs, NOISE, 1.0, Threads(1)).with_paths(robot.physics))
 
 
 def test_readings_depend_on_the_path_a_robot_gives() -> None:
@@ -43,3 +47,9 @@ def test_the_right_robot_reaches_the_floor_of_noise() -> None:
     for misfit in judge(contender(WIDE), contender(EV3)).values():
         assert misfit.after == pytest.approx(misfit.floor, rel=0.5)
         assert misfit.after <= misfit.before * 1.02
+
+
+def test_the_last_part_of_the_only_recording_is_judged_from_where_the_recording_began() -> None:
+    late = hold_out(Case("one", (RUNS[1],))).held
+    for misfit in judge(contender(WIDE, late), contender(EV3, late)).values():
+        assert misfit.after == pytest.approx(misfit.floor, rel=0.5)

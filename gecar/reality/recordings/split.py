@@ -13,6 +13,7 @@ from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.recordings.recording import Case, Recording
 
 EVERY = 4  # one recording in so many is set aside
+POSE_FIELDS = ("x_m", "y_m", "heading_rad")
 FIRST_SHARE = 0.7  # of a single recording's time is fitted on
 
 
@@ -66,14 +67,17 @@ def _named(name: str, known: Sequence[str]) -> str:
 
 
 def _by_time(recording: Recording) -> Split:
+    """Set the last part aside; of the first it keeps the commands and the first pose: where the replay begins."""
     cut = recording.t_s[0] + FIRST_SHARE * recording.duration_s
     first = recording.t_s <= cut
+    begun = first & (np.cumsum(~np.isnan(recording.x_m)) == 1) & ~np.isnan(recording.x_m)
     early, late = recording, recording
     for field, _ in COLUMNS.values():
         values = getattr(recording, field)
         kept: dict[str, Any] = {field: values[first]}
         early = replace(early, **kept)
         if field not in ("t_s", "left_duty", "right_duty"):
-            blanked: dict[str, Any] = {field: np.where(first, np.nan, values)}
+            known = begun if field in POSE_FIELDS else False
+            blanked: dict[str, Any] = {field: np.where(first & ~known, np.nan, values)}
             late = replace(late, **blanked)
     return Split((early,), (late,), by_time=True)
