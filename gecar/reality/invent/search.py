@@ -266,7 +266,9 @@ def search(
         for laws in some:
             library.gain(laws)
     promising = _promising(library, singles)
-    kept = sorted(singles, key=lambda laws: _loss(library, laws))[:KEPT_LAWS]
+    ordered = sorted(singles, key=lambda laws: _loss(library, laws))
+    of_wheels = {laws[0].port: laws for laws in reversed(ordered) if _is_of_each_wheel(laws)}
+    kept = [*ordered[:KEPT_LAWS], *of_wheels.values()]
     tell(f"laws evolved at {', '.join(port for port in ports if port in promising)}")
     evolved = _evolved(library, at_ports(there, sorted(promising)), seed, unknown)
     candidates = {key(laws): laws for laws in (*_greedy_sums(library, kept), *evolved, *kept)}
@@ -306,8 +308,9 @@ def _loss(library: Library, laws: Laws) -> float:
 def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
     """Return the laws to fit in full, best first.
 
-    At each port these are the best law, the best of one part (several at the best port), and the best of the shortest:
-    sensitivities overrate long and steep laws, whose effect is not in proportion to their size.
+    At each port these are the best law, the best of one part (several at the best port), the best of the shortest, and
+    the best that each wheel has for itself: sensitivities overrate long and steep laws, whose effect is not in
+    proportion to their size, and underrate what holds a wheel back at one angle only from some size on.
     """
     at_port: dict[str, list[Laws]] = {}
     for laws in ranked:
@@ -315,9 +318,20 @@ def _spread_over_ports(ranked: Sequence[Laws]) -> list[Laws]:
     kept = list[Laws]()
     for number, here in enumerate(at_port.values()):
         plain = [laws for laws in here if len(parts_of(laws)) == len(laws)]
-        chosen = [here[0], *plain[: AT_BEST if number == 0 else 1], min(here, key=complexity)]
+        of_each_wheel = list(filter(_is_of_each_wheel, here))
+        chosen = [
+            here[0],
+            *plain[: AT_BEST if number == 0 else 1],
+            min(here, key=complexity),
+            *of_each_wheel[:1],
+        ]
         kept += [laws for laws in here if laws in chosen]
     return sorted(kept, key=ranked.index)[:FINALISTS]
+
+
+def _is_of_each_wheel(laws: Laws) -> bool:
+    """Whether either wheel has a law of its own."""
+    return len({term.side for term in laws}) > 1
 
 
 def _greedy_sums(library: Library, singles: Sequence[Laws]) -> list[Laws]:
