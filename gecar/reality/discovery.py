@@ -45,7 +45,7 @@ from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.acceptance import is_worthwhile, size_of, stands_out, worsens
+from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
@@ -311,15 +311,12 @@ def _explained_without(
     problem = _problem(context, context.robot, alone, beside)
     motion = _with_intervals(context, confirmed(explain(problem), beside), beside)
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
-    # What is left out may be off, but a cause does not take the robot farther from it; and what is smaller than the
-    # catalogue's size, or has not one size in all recordings, may be part of what is left.
+    # What is left out may be off, but a cause does not take the robot farther from it; and what has not one size in all
+    # recordings may be part of what is left.
     if (
         not motion.explained.steps
         or motion.explained.unexplained
-        or not all(
-            is_worthwhile(taken, step.effect) and stands_out(motion.explained.problem, step)
-            for step in motion.explained.steps
-        )
+        or not all(stands_out(motion.explained.problem, step) for step in motion.explained.steps)
         or worsens(problem, problem.known, taken, whole)
     ):
         return None

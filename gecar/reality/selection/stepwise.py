@@ -21,6 +21,7 @@ from gecar.reality.selection.acceptance import (
     is_worthwhile,
     most_uneven,
     proved,
+    stands_out,
     stopped,
 )
 from gecar.reality.selection.cross_validation import judged
@@ -173,13 +174,17 @@ def _standing_beside(
 ) -> list[Step]:
     """Return the effects that may be named beside what they leave: all, unless that is material.
 
-    Then effects below the catalogue's size may not: they may be part of what is left. Where they leave much of it,
-    others must stand out of it; the most uneven goes first, as it bends the others.
+    Then effects below the catalogue's size must stand out of it, as they may be part of what is left; and all must
+    where they leave much of it: the most uneven goes first, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
     if not _is_much(model, now, before):
         return list(steps)
-    kept = [step for step in steps if problem.on_bench or is_worthwhile(model, step.effect)]
+    kept = [
+        step
+        for step in steps
+        if problem.on_bench or is_worthwhile(model, step.effect) or stands_out(problem, step)
+    ]
     hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
     if len(kept) < len(steps) or not hardly:
         return kept
