@@ -309,7 +309,7 @@ def _explained_without(
         return None
     context.tell(f"much is unexplained: once more without the {instrument}")
     problem = _problem(context, context.robot, alone, beside)
-    motion = _with_intervals(context, confirmed(explain(problem), beside), beside)
+    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), beside), beside)
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
     # What is left out may be off, but a cause does not take the robot farther from it; and what has not one size in all
     # recordings may be part of what is left.

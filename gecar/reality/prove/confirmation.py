@@ -64,7 +64,7 @@ def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
     problem.tell(f"once more without {', '.join(sorted(refused))}")
     # Clocks that were fitted on the way are those of the recordings, whatever moves the robot.
     begun = first.explained.problem if first.explained.problem.clocks_fitted else problem
-    again = confirmed(explain(replace(begun, refused=refused)), held)
+    again = confirmed(explain(replace(begun, refused=refused), once_more=True), held)
     if len(again.explained.steps) <= len(first.explained.steps):
         return first
     return replace(again, candidates=(*first.candidates, *again.candidates))

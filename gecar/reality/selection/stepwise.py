@@ -85,10 +85,11 @@ class Explanation:
     drifting: tuple[Step, ...] = ()
 
 
-def explain(problem: Problem) -> Explanation:
+def explain(problem: Problem, once_more: bool = False) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate.
 
-    Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes.
+    Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes. That is
+    half the time, and not done ``once_more`` where recordings are explained without what was refused or an instrument.
     """
     known = problem.under(problem.known)
     first = candidate_steps(known, known.known)
@@ -96,11 +97,12 @@ def explain(problem: Problem) -> Explanation:
         return _explain_motor(known, first)
     with_clocks = _with_clocks(known, known.known, first)
     if with_clocks is not None:
-        return explain(with_clocks)
+        return explain(with_clocks, once_more)
     chain = _forward(known, _Chain((), known.known, ()), first)
     if chain.with_clocks is not None:
-        return explain(chain.with_clocks)
-    best = _best_chain(problem, [chain, *_other_beginnings(known, first, chain)])
+        return explain(chain.with_clocks, once_more)
+    others = [] if once_more else _other_beginnings(known, first, chain)
+    best = _best_chain(problem, [chain, *others])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     return concluded(problem, model, steps, tried)
