@@ -175,10 +175,7 @@ def _late(term: Term) -> str:
     if term.port == "command" and shape == "(store - command)" and term.store == "command":
         late_s, what = value * term.store_s, "commands that act"
     elif (term.port, shape) in _RATES:
-        late_s, what = (
-            -value,
-            "a colour sensor that is" if term.port == "sensor_ahead" else "a camera that is",
-        )
+        late_s, what = -value, f"a {'colour sensor' if term.port == 'sensor_ahead' else 'camera'} that is"
     else:
         return ""
     return f"{what} {'late' if late_s > 0.0 else 'early'}, by about {1e3 * abs(late_s):.0f} ms"

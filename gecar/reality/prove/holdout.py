@@ -29,11 +29,9 @@ _FIELDS = tuple(
     for column, (field, _) in COLUMNS.items()
     if field not in ("t_s", "left_duty", "right_duty")
 )
-COURSE_REACH = (
-    2.0 * SMALL
-)  # of the size worth a name: how far the course may lie elsewhere for each robot judged
+COURSE_REACH = 2.0 * SMALL  # of the size worth a name: how far the course may lie elsewhere
 AT_AN_EDGE_PCT = (
-    20.0  # errors of readings at an edge, where the course is looked for: they count by their squares
+    20.0  # a reading's error beside an edge: while the course is looked for it counts by its square
 )
 _ROW = {"left_angle_rad": 0, "right_angle_rad": 1, "battery_v": 2, "yaw_rate_rad_s": 3}
 _POSE = {"x_m": 0, "y_m": 1, "heading_rad": 2}
