@@ -69,6 +69,7 @@ def test_the_gap_closed_counts_channels_made_worse_and_not_those_that_show_noise
         "battery_v": noise_alone,
     }
     judged = Judgement(("run_07",), False, channels)
+    assert channels["heading_deg"].gaps == pytest.approx((0.5, 1.25))
     assert judged.gap_closed == pytest.approx((8.0 - 0.75) / (9.0 + 0.5))
 
 

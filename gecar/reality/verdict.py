@@ -32,6 +32,11 @@ class Misfit:
     floor: float
     deviation: float = math.nan
 
+    @property
+    def gaps(self) -> tuple[float, float]:
+        """How far before and after are above the floor, in units of it."""
+        return self.before / self.floor - 1.0, self.after / self.floor - 1.0
+
     def as_json(self) -> dict[str, float]:
         """Return the three figures as they are written."""
         return {"before": self.before, "after": self.after, "floor": self.floor}
@@ -203,8 +208,8 @@ class Judgement:
         counts more because little varies in it.
         """
         seen = [m for m in self.channels.values() if max(m.before, m.after) > VISIBLE * m.floor]
-        gap = sum(m.before / m.floor - 1.0 for m in seen)
-        return sum((m.before - m.after) / m.floor for m in seen) / gap if gap > 0.0 else None
+        was, now = (sum(gaps) for gaps in zip(*(m.gaps for m in seen), strict=True)) if seen else (0.0, 0.0)
+        return (was - now) / was if was > 0.0 else None
 
     @property
     def failed(self) -> bool:

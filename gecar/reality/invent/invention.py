@@ -42,7 +42,7 @@ Array = npt.NDArray[np.float64]
 
 MOST_LAWS = 3
 TRIED = 5  # of the best laws, until one is proved
-HELPS = 0.85  # of what whole drives set aside part by without a law: with it they must part by less
+HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
 LAWS_LEAVE = 0.15  # share of the error without any: a law has not the cause's own form
 ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
@@ -264,8 +264,7 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
         return None
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
     whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
-    was = sum(max(misfit.before - misfit.floor, 0.0) for misfit in whole)
-    now = sum(max(misfit.after - misfit.floor, 0.0) for misfit in whole)
+    was, now = np.maximum([misfit.gaps for misfit in whole], 0.0).reshape(-1, 2).sum(axis=0)
     return gain if now < HELPS * was else None
 
 
