@@ -50,7 +50,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
-from gecar.reality.selection.thresholds import SIGNIFICANCE
+from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -196,6 +196,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     effects, rivals = _findings(context, stages)
     unexplained = any(stage.explained.unexplained for stage in stages)
     invented = tuple(law for stage in stages for law in stage.invented)
+    small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), unexplained)
     where = _located(context, stages, fitted, found)
     seen_from = _limits(context, stages)
@@ -203,7 +204,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         case=name,
         verdict=word,
         effects=effects,
-        minor=tuple(_minor(context, stage, step) for stage in stages for step in stage.explained.minor),
+        minor=tuple(each for each in small if context.material.times(each.size) > NEGLIGIBLE),
         invented=invented,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
