@@ -18,7 +18,7 @@ import numpy.typing as npt
 from shapely.geometry import Point
 
 from gecar.language.program import Program
-from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.columns import COLUMNS, POSE_FIELDS
 from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.reflectance import readings_along
@@ -177,12 +177,8 @@ def _trial(
     path, by_odometry = recorded_path(recording, robot, course)
     arrival, arrived, checkpoints = arrival_of(path, course)
     since = recording.t_s - recording.t_s[0]
-    trace = (
-        driven[0]
-        if driven
-        else {"t_s": since, **{f: getattr(replayed, f) for f in ("x_m", "y_m", "heading_rad")}}
-    )
-    simulated = Path(*(np.asarray(trace[f]) for f in ("t_s", "x_m", "y_m", "heading_rad")))
+    trace = driven[0] if driven else {"t_s": since, **{f: getattr(replayed, f) for f in POSE_FIELDS}}
+    simulated = Path(*(np.asarray(trace[f]) for f in ("t_s", *POSE_FIELDS)))
     if driven and not in_course:  # a replay's start is fitted to the poses seen
         path = path.moved_to(simulated.x_m[0], simulated.y_m[0])
     t = np.arange(0.0, min(path.t_s[-1], arrival, simulated.t_s[-1]) + 1e-9, STEP_S)
@@ -259,7 +255,7 @@ def _against_drive(
         simulated = np.interp(since[both], trace["t_s"], trace[name])
         out[CHANNELS[name]] = nrmse(getattr(recording, name)[both], simulated)
     within = path.t_s <= trace["t_s"][-1]
-    for name in ("x_m", "y_m", "heading_rad"):
+    for name in POSE_FIELDS:
         simulated = np.interp(path.t_s[within], trace["t_s"], trace[name])
         out[CHANNELS[name]] = nrmse(getattr(path, name)[within], simulated)
     return {column: value for column, value in out.items() if not np.isnan(value)}

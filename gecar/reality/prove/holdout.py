@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gecar.reality.noise.sensor_noise import PATH_CAUTION, Noise
 from gecar.reality.optimisation.least_squares import least_squares, row_by_row
-from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.columns import COLUMNS, POSE_FIELDS
 from gecar.reality.replay.replayer import Prediction, Replayer, replayer_of
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
@@ -30,11 +30,8 @@ _FIELDS = tuple(
     if field not in ("t_s", "left_duty", "right_duty")
 )
 COURSE_REACH = 2.0 * SMALL  # of the size worth a name: how far the course may lie elsewhere
-AT_AN_EDGE_PCT = (
-    20.0  # a reading's error beside an edge: while the course is looked for it counts by its square
-)
+AT_AN_EDGE_PCT = 20.0  # a reading's error beside an edge, so that in a fit it counts by its square
 _ROW = {"left_angle_rad": 0, "right_angle_rad": 1, "battery_v": 2, "yaw_rate_rad_s": 3}
-_POSE = {"x_m": 0, "y_m": 1, "heading_rad": 2}
 
 
 @dataclass(frozen=True)
@@ -150,7 +147,7 @@ def _errors(
     if correction is not None:
         rows, poses = correction(replayer, rows, poses)
     out = {f: getattr(recording, f) - rows[:, k] for f, k in _ROW.items()}
-    for field, k in _POSE.items():
+    for k, field in enumerate(POSE_FIELDS):
         out[field] = replayer.inputs.pose[:, k] - poses[:, k]
     if run.reads:
         out["reflection_pct"] = _reading_errors(run, seen)

@@ -24,3 +24,4 @@ COLUMNS = MappingProxyType({
     "battery_v": ("battery_v", 1.0),
     "yaw_rate_dps": ("yaw_rate_rad_s", math.pi / 180.0),
 })  # fmt: skip
+POSE_FIELDS = ("x_m", "y_m", "heading_rad")

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from gecar.errors import expected, one_of
-from gecar.reality.recordings.columns import COLUMNS
+from gecar.reality.recordings.columns import COLUMNS, POSE_FIELDS
 from gecar.reality.recordings.recording import Case, Recording
 
 EVERY = 4  # one recording in so many is set aside
-POSE_FIELDS = ("x_m", "y_m", "heading_rad")
 FIRST_SHARE = 0.7  # of a single recording's time is fitted on
 
 
@@ -70,7 +69,8 @@ def _by_time(recording: Recording) -> Split:
     """Set the last part aside; of the first it keeps the commands and the first pose: where the replay begins."""
     cut = recording.t_s[0] + FIRST_SHARE * recording.duration_s
     first = recording.t_s <= cut
-    begun = first & (np.cumsum(~np.isnan(recording.x_m)) == 1) & ~np.isnan(recording.x_m)
+    seen = ~np.isnan(recording.x_m)
+    begun = seen & (np.cumsum(seen) == 1)
     early, late = recording, recording
     for field, _ in COLUMNS.values():
         values = getattr(recording, field)

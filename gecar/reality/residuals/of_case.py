@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.noise.sensor_noise import Noise
+from gecar.reality.recordings.columns import POSE_FIELDS
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.replay.odometry import smoothed_rows
@@ -31,7 +32,7 @@ Physics = npt.NDArray[Any]
 GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: within 2 %, 0.6 deg/s, 10 ms
 ENCODER_WAVE_RAD = math.radians(1.0)  # as much as such an encoder's resolution
 # Each tells motion by itself; with their fields of a recording.
-INSTRUMENTS = {"encoders": ("left_angle_rad", "right_angle_rad"), "poses": ("x_m", "y_m", "heading_rad")}
+INSTRUMENTS = {"encoders": ("left_angle_rad", "right_angle_rad"), "poses": POSE_FIELDS}
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
