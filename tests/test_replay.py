@@ -58,6 +58,17 @@ def test_the_start_pose_is_fitted_to_the_whole_path() -> None:
     assert abs(replay(shifted, EV3).x_m[0] - recording.x_m[0]) < 2e-4
 
 
+@pytest.mark.parametrize("effects", [{}, {"floor_tilt": {"x_rad": 0.03, "y_rad": 0.02}}])
+def test_a_start_that_is_far_off_is_found_where_the_floor_has_a_direction_or_none(effects: dict) -> None:
+    robot = EV3.with_effects(effects)
+    recording = driven(waves, steps, robot=robot)
+    replayer = replayer_of(recording)
+    there = replace(replayer, start=replayer.start + np.array([0.05, -0.04, 0.2]))
+    np.testing.assert_allclose(there.aligned_start(robot.physics), [1.0, 0.5, 0.3], atol=1e-5)
+    early = there.aligned_start(robot.physics, within_s=1.0)
+    np.testing.assert_allclose(early, [1.0, 0.5, 0.3], atol=1e-4)
+
+
 def test_a_late_command_moves_the_whole_run_later() -> None:
     recording = driven(steps, steps)
     late = replay(recording, EV3.with_effects({"actuation_delay": {"time_s": 0.1}}), align=False)

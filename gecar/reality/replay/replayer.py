@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 from scipy.spatial import KDTree
 
 from gecar.reality.recordings.camera_frame import axle_pose
@@ -20,6 +19,7 @@ from gecar.reality.recordings.encoder_zero import LATEST_FIRST_ROW_S
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_input import KernelInput
+from gecar.reality.replay.rigid_alignment import moved_start
 from gecar.world.kernel.dynamics import is_plain
 from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot
@@ -32,6 +32,8 @@ USUAL_NOISE = (0.29 * DEG, 0.01, 0.5 * DEG, 0.001, 0.3 * DEG)
 USUAL_WALK = (3e-4, 0.1 * DEG)  # m/sqrt(s), rad/sqrt(s)
 PATCH = ("patch_radius", "patch_x", "patch_y", "patch_friction")
 X_Y = slice(4, 6)  # columns of predicted rows
+MOST_ALIGNMENTS = 10
+STILL = 1e-6  # m and rad, of a start pose
 FEWEST_LANES = 4  # fewer robots are replayed faster one by one
 
 
@@ -189,19 +191,19 @@ class Replayer:
     def aligned_start(self, physics: npt.NDArray[Any], within_s: float = np.inf) -> Array:
         """Return the start pose whose open-loop replay fits the poses best, shape (3,) [m, m, rad].
 
-        The start is a nuisance: one noisy camera frame would otherwise tilt the whole path.
+        The start is a nuisance: one noisy camera frame would otherwise tilt the whole path. A path goes along with its
+        start, but for what belongs to the floor (a slope, a patch): so it is replayed until it stays.
         """
         if not self.has_poses:
             return self.start
         early = self.inputs.pose_t <= within_s
-        scale = np.array([0.01, 0.01, 0.05])
-
-        def misfit(shift: Array) -> Array:
-            errors = self.play(physics, self.start + shift * scale).pose_errors[early]
-            return np.tanh(np.nan_to_num(errors.ravel()) / 30.0)  # slides far off must not tilt the start
-
-        found = least_squares(misfit, np.zeros(3), max_nfev=20).x
-        return self.start + np.asarray(found) * scale
+        start = self.start
+        for _ in range(MOST_ALIGNMENTS):
+            poses = self.play(physics, start).poses[early]
+            before, start = start, moved_start(self.inputs.pose[early], poses, self.inputs.sd[3:], start)
+            if np.abs(start - before).max() < STILL:
+                break
+        return start
 
 
 def replayer_of(
