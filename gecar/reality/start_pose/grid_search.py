@@ -23,6 +23,7 @@ FINE_SPOT_M = 0.015
 SCANNED, RETURNED = 60, 12
 READING_SD = 25.0  # of a reading on the blurred floor [%]
 MOST_PER_SAMPLE = 4.0  # of cost
+GIVEN_UP_AFTER = 16  # samples: how often a row of starts is looked at
 NEAR_M, NEAR_RAD = 0.06, math.radians(8.0)  # what a fine scan covers
 SAME_M, SAME_RAD = 0.015, math.radians(2.0)  # a line has two edges, two centimetres apart
 
@@ -49,17 +50,21 @@ def likely_starts(points: Array, read: Array, course: Course, physics: Physics) 
     x, y = (np.arange(0.5 * GRID_M, size, GRID_M) for size in (course.width_m, course.height_m))
     angles = np.linspace(0.0, math.tau, HEADINGS, endpoint=False)
     floor = _blurred(course, physics, GRID_M, COARSE_SPOT_M)
-    best = np.empty((HEADINGS, 4))
-    _scan(floor, GRID_M, points, read, bare, x, y, angles, best)
     home = np.array([course.start.x_m, course.start.y_m, course.start.heading_rad])
+    best = np.empty((1, 4))
+    own = home[:1], home[1:2], home[2:]  # most drives begin there
+    _scan(floor, GRID_M, points, read, bare, *own, math.inf, best)
+    least, best = float(best[0, 0]), np.empty((HEADINGS, 4))
+    _scan(floor, GRID_M, points, read, bare, x, y, angles, least, best)
     places = [home, *_distinct(best, NEAR_M, NEAR_RAD)[:SCANNED]]
     floor = _blurred(course, physics, FINE_M, FINE_SPOT_M)
     around = np.arange(-FINE_STEPS, FINE_STEPS + 1)
-    finer = []
+    least, finer = math.inf, []
     for x0, y0, angle in places:
         best = np.empty((len(around), 4))
         own = x0 + FINE_M * around, y0 + FINE_M * around, angle + FINE_RAD * around
-        _scan(floor, FINE_M, points, read, bare, *own, best)
+        _scan(floor, FINE_M, points, read, bare, *own, least, best)
+        least = min(least, float(best[:, 0].min()))
         finer.append(best)
     return _distinct(np.concatenate(finer), SAME_M, SAME_RAD)[:RETURNED]
 
@@ -67,7 +72,7 @@ def likely_starts(points: Array, read: Array, course: Course, physics: Physics) 
 def _distinct(found: Array, near_m: float, near_rad: float) -> list[Array]:
     """Return starts, best first, without those near a better one; rows are cost, x, y, heading."""
     starts: list[Array] = []
-    for start in found[np.argsort(found[:, 0]), 1:]:
+    for start in found[np.argsort(found[:, 0])[: np.isfinite(found[:, 0]).sum()], 1:]:
         if not any(near(start, other, near_m, near_rad) for other in starts):
             starts.append(start)
     return starts
@@ -92,34 +97,43 @@ def _scan(
     x: Array,
     y: Array,
     angles: Array,
+    least: float,
     best: Array,
 ) -> None:
-    """Try every start of a grid; write each heading's least cost and the start, shape (headings, 4)."""
+    """Try every start of a grid; write each heading's least cost and the start, shape (headings, 4).
+
+    The grid is as fine as the floor is drawn: a row of starts sees a row of the floor, which vector instructions
+    compare at once. A row is given up at twice the least cost of any start so far, ``least`` to begin with; the cost of
+    a heading without any other is infinite.
+    """
     rows, columns = floor.shape
-    least = np.inf
+    cost = np.empty(len(x))
     for h in range(angles.shape[0]):
         cos = math.cos(angles[h]) / pitch
         sin = math.sin(angles[h]) / pitch
-        best[h, 0] = np.inf
-        best[h, 3] = angles[h]
+        best[h] = np.inf
         for i in range(y.shape[0]):
-            for j in range(x.shape[0]):
-                cost = 0.0
-                most = min(best[h, 0], 2.0 * least)
-                for k in range(points.shape[0]):
-                    column = math.floor(x[j] / pitch + points[k, 0] * cos - points[k, 1] * sin)
-                    row = math.floor(y[i] / pitch + points[k, 0] * sin + points[k, 1] * cos)
-                    level = bare
-                    if 0 <= column < columns and 0 <= row < rows:
-                        level = floor[row, column]
-                    z = (read[k] - level) / READING_SD
-                    cost += min(z * z, MOST_PER_SAMPLE)
-                    if cost >= most:
-                        break
-                if cost < best[h, 0]:
-                    best[h, 0] = cost
-                    best[h, 1] = x[j]
-                    best[h, 2] = y[i]
+            cost[:] = 0.0
+            most = min(best[h, 0], 2.0 * least)
+            for k in range(points.shape[0]):
+                if k % GIVEN_UP_AFTER == 0 and cost.min() >= most:
+                    break
+                column = math.floor(x[0] / pitch + points[k, 0] * cos - points[k, 1] * sin)
+                row = math.floor(y[i] / pitch + points[k, 0] * sin + points[k, 1] * cos)
+                first = min(max(-column, 0), len(cost))
+                last = min(max(columns - column, first), len(cost)) if 0 <= row < rows else first
+                z = (read[k] - bare) / READING_SD
+                outside = min(z * z, MOST_PER_SAMPLE)
+                cost[:first] += outside
+                cost[last:] += outside
+                if first < last:
+                    here, level = cost[first:last], floor[row, column + first : column + last]
+                    for j in range(len(here)):
+                        z = (read[k] - level[j]) / READING_SD
+                        here[j] += min(z * z, MOST_PER_SAMPLE)
+            cheapest = np.argmin(cost)
+            if cost[cheapest] < most:
+                best[h] = cost[cheapest], x[cheapest], y[i], angles[h]
         least = min(least, best[h, 0])
 
 
