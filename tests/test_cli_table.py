@@ -62,7 +62,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(gecar, tmp_path, words, named)
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_study_that_is_stopped_keeps_its_finished_runs(gecar, tmp_path, how):
     """All at once, as a terminal sends Ctrl-C; or the command alone, as the system kills it."""
-    long = (*GRID, "--generations", 20, "--no-pictures")
+    long = (*GRID, "--generations", 10, "--no-pictures")
     process = start("table", *long, "--workers", 2, "--out", "stopped", cwd=tmp_path, start_new_session=True)
     until = time.monotonic() + 90
     while not list(tmp_path.glob("stopped/runs/[!.]*")):

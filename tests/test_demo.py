@@ -11,7 +11,7 @@ from command import call
 from gecar.cli.actions import demo
 
 # Fewer generations, drives and exercises than the command's own, and the same stages.
-QUICK = ("--generations", "8", "--quiet", "--json", "--out", "shown")
+QUICK = ("--generations", "4", "--quiet", "--json", "--out", "shown")
 
 
 @pytest.fixture(scope="module")

@@ -53,7 +53,7 @@ def test_an_effect_is_found_beside_an_instrument_that_errs_and_this_stays_unexpl
     within: float,
 ) -> None:
     robot = EV3.with_effects({effect: {label: value}})
-    verdict = discover(Case("made", tuple(damaged(robot, seed) for seed in range(5))))
+    verdict = discover(Case("made", tuple(damaged(robot, seed) for seed in range(4))))
     assert verdict.verdict == "missing_and_unexplained"
     (found,) = verdict.effects
     assert found.id == effect
@@ -66,5 +66,5 @@ def test_an_effect_is_found_beside_an_instrument_that_errs_and_this_stays_unexpl
 def test_an_instrument_that_errs_alone_is_unexplained_and_nothing_is_named(
     damaged: Callable[[Robot, int], Recording],
 ) -> None:
-    verdict = discover(Case("made", tuple(damaged(EV3, seed) for seed in range(5))))
+    verdict = discover(Case("made", tuple(damaged(EV3, seed) for seed in range(4))))
     assert (verdict.verdict, verdict.effects) == ("unexplained", ())
