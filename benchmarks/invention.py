@@ -61,7 +61,7 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "wheel_radius_difference": (("rolling_radius",), ("side",)),
     "tyre_friction": (("tyre_grip", "wheel_load"), ("",)),
     "slippery_patch": (("tyre_grip", "wheel_load"), ("x", "y")),
-    "caster_drag": (("yaw_moment", "force_ahead"), ("turn_rate", "ahead")),
+    "caster_drag": (("caster_friction",), ("",)),
     "rolling_resistance": (("gear_friction", "motor_torque", "force_ahead"), ("", "speed", "ahead", "load")),
     "floor_tilt": (_FORCE, ("", "distance")),
     "load_transfer": (("wheel_load", "tyre_grip"), ("ahead", "aside", "turn_rate", "load")),

@@ -50,6 +50,7 @@ SAME = [
      law("command", "store - command", store="store + max(-0.05, min(0.05, command - store))", store_s=0.025), 0.03),
     (effect("backlash", angle_deg=4.0), law("gear_play", "a", a=math.radians(4.0)), 1e-9),
     (effect("track_width", scale=1.05), law("track_width", "a", a=0.05), 1e-9),
+    (effect("caster_drag", coefficient=0.1), law("caster_friction", "a", a=0.1), 1e-9),
     (effect("coulomb_friction", torque_nm=NOMINAL.motor.coulomb_friction + 0.01),
      law("gear_friction", "a", a=0.01), 1e-9),
     (effect("viscous_friction", coefficient_nms=0.002), law("motor_torque", "-b * speed", b=0.002), 0.04),

@@ -135,6 +135,7 @@ PORTS: tuple[Port, ...] = (
     Port("yaw_moment", "N m", "a turning moment on the body", False, 0.1),
     Port("gear_play", "rad", "play between the gears and the wheel", True, 0.1),
     Port("track_width", "-", "a share of the distance between the wheels", False, 0.1),
+    Port("caster_friction", "-", "friction between caster and floor", False, 0.1),
     Port("encoder_reading", "rad", "an error of the encoder", True, 0.1, ("time", "angle", "speed", "side"),
          "encoders", True),
     Port("gyro_reading", "rad/s", "an error of the gyro", False, 0.2, _SEEN, "gyro"),

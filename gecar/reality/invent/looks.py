@@ -65,6 +65,7 @@ _KNOWN = (
     _Known(("gear_play",), r"1", "less play than the robot's file says", "play in the gears"),
     _Known(("gear_play",), r"time", "a wheel that gets tighter", "a wheel that comes loose"),
     _Known(("track_width",), r"1", "wheels closer together", "wheels farther apart"),
+    _Known(("caster_friction",), r"1", "a caster that drags less", "a caster that drags"),
     _Known(("sensor_ahead",), r"1", "a colour sensor that sits farther back",
            "a colour sensor that sits farther ahead"),
     _Known(("sensor_aside",), r"1", "a colour sensor that sits farther right",

@@ -137,6 +137,7 @@ def step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any,
     grip = _grip(s, p) * c.dt
     s.left_circle = max(s.left_circle + grip * asked.left_load, 0.0) * max(1.0 + asked.left_grip, 0.0)
     s.right_circle = max(s.right_circle + grip * asked.right_load, 0.0) * max(1.0 + asked.right_grip, 0.0)
+    s.caster_circle = max(p.caster_friction + asked.caster, 0.0) * _caster_load(s, c) * c.dt
     release_contacts(s)
     if not sweep(s, c, True) and not sweep(s, c, True):
         sweep(s, c, True)
@@ -258,9 +259,8 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
     wheel to wheel.
     """
-    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
     aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
-    caster = min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
+    caster = _caster_load(s, c)
     wheel = 0.5 * (c.weight - caster)
     left = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
     right = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
@@ -270,6 +270,13 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     s.left_circle = grip * left
     s.right_circle = grip * right
     s.caster_circle = p.caster_friction * caster * c.dt
+
+
+@kernel
+def _caster_load(s: Any, c: Any) -> float:
+    """Return the load on the caster [N]: static, plus what the last step's impulses ahead shift onto it."""
+    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
+    return min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
 
 
 @kernel

@@ -45,7 +45,7 @@ STORES = np.dtype([("of", np.float64, (2, N_TERMS)), ("supply_voltage", np.float
 _ASKED = (
     "left_command right_command supply_voltage left_torque right_torque left_friction right_friction "
     "left_radius right_radius left_load right_load left_grip right_grip "
-    "force_ahead force_aside force_x force_y yaw_moment left_play right_play track shape_terms"
+    "force_ahead force_aside force_x force_y yaw_moment left_play right_play track caster shape_terms"
 )
 ASKED = np.dtype([(field, np.float64) for field in _ASKED.split()])
 """What terms ask for at the ports of the dynamics in a step."""
@@ -61,9 +61,9 @@ assert VARIABLE["draw"] == _DRAW
 
 _PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_LOAD, _PORT_GRIP = range(7)
 _PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
-_PORT_PLAY, _PORT_TRACK = 13, 14
-PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(15, 21)
-_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE = range(21, 24)
+_PORT_PLAY, _PORT_TRACK, _PORT_CASTER = 13, 14, 15
+PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(16, 22)
+_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE = range(22, 25)
 assert PORT_NUMBER["sensor_aside"] == _PORT_SENSOR_ASIDE
 
 _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
@@ -206,7 +206,7 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
     asked.left_radius = asked.right_radius = asked.left_load = asked.right_load = 0.0
     asked.left_grip = asked.right_grip = asked.force_ahead = asked.force_aside = 0.0
     asked.force_x = asked.force_y = asked.yaw_moment = asked.track = asked.shape_terms = 0.0
-    asked.left_play = asked.right_play = 0.0
+    asked.left_play = asked.right_play = asked.caster = 0.0
     for k in range(int(laws.n_terms)):
         port = int(laws.terms[k, PORT])
         if port >= PORT_ENCODER:
@@ -225,6 +225,7 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
             _PORT_FORCE_Y,
             _PORT_YAW,
             _PORT_TRACK,
+            _PORT_CASTER,
         ):
             _add_whole(asked, port, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2))
         else:
@@ -264,6 +265,8 @@ def _add_whole(asked: Any, port: int, value: float) -> None:
         asked.force_y += value
     elif port == _PORT_YAW:
         asked.yaw_moment += value
+    elif port == _PORT_CASTER:
+        asked.caster += value
     else:
         asked.shape_terms += 1.0
         asked.track += value
