@@ -80,7 +80,7 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "floor_ridge": ((*_FORCE, "tyre_grip", "wheel_load"), ("distance", "x", "y")),
     "camera_lens": (("pose_x", "pose_y", "pose_toward"), ("x", "y", "distance")),
     "ambient_light": (("colour_reading",), ("heading",)),
-    "pose_drift": (("pose_x", "pose_y", "pose_heading"), ("time",)),
+    "pose_drift": (("pose_turn", "pose_x", "pose_y", "pose_heading"), ("time",)),
     "motor_heat": (("motor_torque", "supply_voltage", "command"), ("store", "time")),
     "loosening_wheel": (("gear_play",), ("time",)),
     "current_limit": (("motor_torque", "command"), ("current",)),

@@ -11,7 +11,7 @@ from gecar.errors import InputError
 from gecar.language.program import parse_program
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course.course import load_course
-from gecar.world.ports import PORTS, TOWARD_A_POINT, VARIABLES
+from gecar.world.ports import AT_A_POINT, PORTS, VARIABLES
 from gecar.world.robot import load_robot, read_robot, robot_from, write_robot
 from gecar.world.rollout import World, simulate, simulate_many
 from gecar.world.terms import MOST_CHARACTERS, Term
@@ -133,6 +133,18 @@ def test_an_error_of_the_camera_changes_poses_alone():
     assert np.array_equal(seen.rows, plain.rows)
 
 
+def test_a_camera_that_turns_turns_all_that_it_sees_about_a_point():
+    turning = law("pose_turn", "a * time", a=0.02, at_x=0.3, at_y=-0.1)
+    plain, seen = (replayer_of(RECORDING).play(robot.physics) for robot in (NOMINAL, turning))
+    turn = 0.02 * RECORDING.t_s[np.flatnonzero(~np.isnan(RECORDING.x_m))]
+    x, y = (plain.poses[:, :2] - (0.3, -0.1)).T
+    there = np.column_stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)])
+    there += np.array([0.3, -0.1])
+    assert np.allclose(seen.poses[:, :2], there, atol=1e-4)
+    assert np.allclose(seen.poses[:, 2] - plain.poses[:, 2], turn, atol=1e-4)
+    assert np.array_equal(seen.rows, plain.rows)
+
+
 def test_a_lens_moves_poses_along_the_line_to_its_middle():
     bent = law("pose_toward", "a * distance ** 2", a=-0.2, at_x=0.3, at_y=-0.1)
     plain, seen = (replayer_of(RECORDING).play(robot.physics) for robot in (NOMINAL, bent))
@@ -163,7 +175,7 @@ def test_a_sensor_that_a_law_moves_sees_what_one_that_sits_there_does():
 
 @pytest.mark.parametrize("port", PORTS, ids=lambda port: port.id)
 def test_a_term_of_nothing_is_bit_for_bit_no_term(port):
-    point = {"at_x": 1.0, "at_y": 1.0} if port.id in TOWARD_A_POINT else {}
+    point = {"at_x": 1.0, "at_y": 1.0} if port.id in AT_A_POINT else {}
     robot = law(port.id, "a * time", a=0.0, **point)
     replayer = replayer_of(RECORDING, memory_s=1.0)
     assert np.array_equal(replayer.errors(robot.physics), replayer.errors(NOMINAL.physics), equal_nan=True)

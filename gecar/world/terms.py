@@ -17,7 +17,8 @@ A robot file holds them as ``[[term]]`` tables::
     a = 0.05
 
 A law is read by Python's own parser and turned into postfix tokens; it is never run as Python. ``at_x`` and ``at_y``
-are the point that ``force_toward`` and ``pose_toward`` pull to, and that ``distance`` is measured from.
+are the point that ``force_toward`` and ``pose_toward`` pull to, that ``pose_turn`` turns about, and that ``distance``
+is measured from.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from gecar.world.ports import (
+    AT_A_POINT,
     AT_X,
     AT_Y,
     BY_PORT,
@@ -62,7 +64,6 @@ from gecar.world.ports import (
     STORE_LENGTH,
     STORE_S,
     TERM_WIDTH,
-    TOWARD_A_POINT,
     VARIABLE,
     Port,
 )
@@ -253,7 +254,7 @@ class Term(BaseModel):
                 raise ValueError(f"found {name} = {value!r}, expected a finite number")
         if len(self.free) > MOST_CONSTANTS:
             raise ValueError(f"found {len(self.free)} constants, expected at most {MOST_CONSTANTS}")
-        if self.port in TOWARD_A_POINT and set(POINT) - set(self.constants):
+        if self.port in AT_A_POINT and set(POINT) - set(self.constants):
             raise ValueError(f"found {self.port} without at_x and at_y, expected both [m]")
 
     def _check_store(self, port: Port) -> None:

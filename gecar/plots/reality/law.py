@@ -15,7 +15,7 @@ from gecar.plots.style import BLUE, FAINT, INK, SOFT, VERMILION, headline, look,
 from gecar.reality.invent.states import states
 from gecar.reality.verdict import Invented, Verdict
 from gecar.world.course.course import load_course
-from gecar.world.ports import BY_PORT, TOWARD_A_POINT, VARIABLE, VARIABLES
+from gecar.world.ports import AT_A_POINT, BY_PORT, VARIABLE, VARIABLES
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -108,7 +108,7 @@ def along_ways(verdict: Verdict, law: Invented) -> list[Array]:
 
 
 def _has_point(law: Invented) -> bool:
-    return law.term.port in TOWARD_A_POINT
+    return law.term.port in AT_A_POINT
 
 
 def _draw_value(axes: Axes, law: Invented) -> None:

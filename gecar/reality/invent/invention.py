@@ -35,7 +35,7 @@ from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE, SEVERAL
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
-from gecar.world.ports import N_TERMS, PORTS, TOWARD_A_POINT
+from gecar.world.ports import AT_A_POINT, N_TERMS, PORTS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -48,7 +48,7 @@ ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
 OF_PAIR = frozenset(("side", "other_angle", "other_speed"))  # and that one motor alone has not
-ON_FLOOR = frozenset(("force_x", "force_y", *TOWARD_A_POINT))  # ports that have the floor's axes
+ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,7 @@ _KNOWN = (
            "a colour sensor that reads early when the robot turns"),
     _Known(("sensor_ahead", "sensor_aside"), r"(cos|sin)\(heading\)", "a line that lies elsewhere",
            "a line that lies elsewhere"),
+    _Known(("pose_turn",), r"time", "a camera that turns slowly", "a camera that turns slowly"),
     _Known(("force_x",), r"1", "a pull toward -x: a floor that is not level",
            "a pull toward +x: a floor that is not level"),
     _Known(("force_y",), r"1", "a pull toward -y: a floor that is not level",

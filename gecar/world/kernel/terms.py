@@ -63,8 +63,8 @@ _PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_L
 _PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
 _PORT_PLAY, _PORT_TRACK, _PORT_CASTER = 13, 14, 15
 PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(16, 22)
-_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE = range(22, 25)
-assert PORT_NUMBER["sensor_aside"] == _PORT_SENSOR_ASIDE
+_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE, _PORT_POSE_TURN = range(22, 26)
+assert PORT_NUMBER["pose_turn"] == _PORT_POSE_TURN
 
 _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
 _PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
@@ -379,7 +379,22 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
             total += _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand if of_wheel else 2)
         elif port in (PORT_POSE_X, PORT_POSE_Y) and int(laws.terms[k, PORT]) == _PORT_POSE_TOWARD:
             total += _toward(laws, k, v)[port - PORT_POSE_X]
+        elif (
+            port in (PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING)
+            and int(laws.terms[k, PORT]) == _PORT_POSE_TURN
+        ):
+            total += _turned(laws, k, v)[port - PORT_POSE_X]
     return total
+
+
+@kernel
+def _turned(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
+    """Return what a law that turns what the camera sees about its point adds to x, y and heading."""
+    dx, dy = v.of[0, _X] - laws.terms[k, AT_X], v.of[0, _Y] - laws.terms[k, AT_Y]
+    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = math.sqrt(dx * dx + dy * dy)
+    turn = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2)
+    sine, less = math.sin(turn), math.cos(turn) - 1.0
+    return less * dx - sine * dy, sine * dx + less * dy, turn
 
 
 @kernel
