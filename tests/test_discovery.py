@@ -216,7 +216,8 @@ needs_practice = pytest.mark.skipif(
 
 @needs_practice
 def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
-    verdict = discover(read_case(SHARED / "practice" / "p08"))
+    case = read_case(SHARED / "practice" / "p08")
+    verdict = discover(replace(case, recordings=case.recordings[:4]))  # in a fifth of the time of all
     assert [f.id for f in verdict.effects] == ["floor_tilt"]
     tilt = verdict.effects[0].parameters["x_rad"]
     assert tilt.low < 0.06 < tilt.high
