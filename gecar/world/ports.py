@@ -148,7 +148,7 @@ PORTS: tuple[Port, ...] = (
          "camera"),
     Port("sensor_ahead", "m", "a shift of the colour sensor to the front", False, 0.02, _SEEN, "colour"),
     Port("sensor_aside", "m", "a shift of the colour sensor to the left", False, 0.02, _SEEN, "colour"),
-    Port("pose_turn", "rad", "a turn of what the camera sees, about a point on the floor", False, 0.05,
+    Port("pose_turn", "rad", "a turn of the camera's picture", False, 0.05,
          (*_SEEN, "distance"), "camera"),
 )  # fmt: skip
 PORT_NUMBER = {port.id: number for number, port in enumerate(PORTS)}

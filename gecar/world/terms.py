@@ -337,7 +337,8 @@ class Term(BaseModel):
         elif self.store:
             words += f", where store follows {_pretty(filling)} with a time constant of {self.store_s:.3g} s"
         if "at_x" in self.constants:
-            words += f", from ({self.constants['at_x']:.2f}, {self.constants['at_y']:.2f}) m"
+            word = "about" if self.port == "pose_turn" else "from"
+            words += f", {word} ({self.constants['at_x']:.2f}, {self.constants['at_y']:.2f}) m"
         return words
 
     def with_constants(self, values: Mapping[str, float]) -> Term:
