@@ -16,11 +16,11 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.replay.odometry import odometry
 from gecar.reality.replay.replayer import replayer_of
+from gecar.reality.replay.rigid_alignment import starting_at
 from gecar.reality.residuals.of_recording import residuals_of
 from gecar.reality.start_pose.localise import (
     bare_floor,
     find_start,
-    starting_at,
     with_other_wheels,
 )
 from gecar.world.course.course import load_course

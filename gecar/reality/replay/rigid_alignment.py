@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
@@ -36,10 +38,24 @@ def pose_errors(measured: Array, simulated: Array, sd: Array) -> Array:
     return np.column_stack([seen - turned, ahead - turn])
 
 
-def moved_start(measured: Array, simulated: Array, sd: Array, start: Array) -> Array:
-    """Return the start pose with which a path, carried and turned along with it, fits best, shape (3,) [m, m, rad].
+def starting_at(path: Array, start: Array, began: Array | None = None) -> Array:
+    """Return a path that begins at another pose, turned and carried there as a whole, shape (rows, 3).
 
-    Slides far off must not tilt the start: an error e counts as tanh(e / `SLID_OFF`).
+    ``began`` is where it began, if not at its first pose.
+    """
+    pivot = path[0] if began is None else began
+    turn = start[2] - pivot[2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    arm = path[:, :2] - pivot[:2]
+    there = arm @ np.array([[cos, sin], [-sin, cos]]) + start[:2]
+    return np.column_stack([there, path[:, 2] + turn])
+
+
+def moved_start(measured: Array, simulated: Array, sd: Array, start: Array) -> Array:
+    """Return the start pose that brings a simulated path closest to the measured poses, shape (3,) [m, m, rad].
+
+    The path goes along with its start as a whole. Slides far off must not tilt the start: an error e counts as
+    tanh(e / `SLID_OFF`).
 
     Parameters
     ----------
@@ -51,25 +67,17 @@ def moved_start(measured: Array, simulated: Array, sd: Array, start: Array) -> A
         Where the simulated path began, shape (3,) [m, m, rad].
     """
     seen = ~np.isnan(measured)
-    x, y = (simulated[:, :2] - start[:2]).T
     scale = SLID_OFF * np.array([sd[0], sd[0], sd[1]])
 
-    def misfit(shift: Array) -> Array:
-        ahead, aside, turn = shift * _REACH
-        cos, sin = np.cos(turn), np.sin(turn)
-        there = np.column_stack([x * cos - y * sin + ahead, x * sin + y * cos + aside, np.full(len(x), turn)])
-        there[:, :2] += start[:2]
-        there[:, 2] += simulated[:, 2]
-        return np.tanh(((measured - there) / scale)[seen])
+    def misfit(z: Array) -> Array:
+        path = starting_at(simulated, start + z * _REACH, start)
+        return np.tanh(((measured - path) / scale)[seen])
 
-    def slope(shift: Array) -> Array:
-        turn = shift[2] * _REACH[2]
-        cos, sin = np.cos(turn), np.sin(turn)
-        moves = np.zeros((*measured.shape, 3))
-        moves[:, 0, 0] = moves[:, 1, 1] = moves[:, 2, 2] = 1.0
-        moves[:, 0, 2], moves[:, 1, 2] = -x * sin - y * cos, x * cos - y * sin
-        flat = (1.0 - misfit(shift) ** 2)[:, None]
-        return -flat * (moves * _REACH / scale[:, None])[seen]
+    def slope(z: Array) -> Array:
+        there = start + z * _REACH
+        arm = starting_at(simulated, there, start) - there
+        moves = np.tile(np.eye(3), (len(simulated), 1, 1))
+        moves[:, 0, 2], moves[:, 1, 2] = -arm[:, 1], arm[:, 0]
+        return -(1.0 - misfit(z) ** 2)[:, None] * (moves * _REACH / scale[:, None])[seen]
 
-    found = least_squares(misfit, np.zeros(3), slope, max_nfev=20).x
-    return start + found * _REACH
+    return start + least_squares(misfit, np.zeros(3), slope, max_nfev=20).x * _REACH

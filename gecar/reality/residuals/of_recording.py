@@ -20,9 +20,10 @@ from gecar.reality.replay.channels import REFLECTION, ResidualIndex
 from gecar.reality.replay.odometry import odometry
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import Replayer, replayer_of
+from gecar.reality.replay.rigid_alignment import starting_at
 from gecar.reality.replay.smoothed_path import measured_path
 from gecar.reality.residuals.nuisances import Nuisances, SensorPath
-from gecar.reality.start_pose.localise import bare_floor, find_start, starting_at
+from gecar.reality.start_pose.localise import bare_floor, find_start
 from gecar.reality.start_pose.refine import refined
 from gecar.world.course.course import Course
 

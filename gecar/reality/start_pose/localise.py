@@ -15,6 +15,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from gecar.reality.optimisation.least_squares import KNEE, least_squares, row_by_row
 from gecar.reality.replay.reflectance import readings_along
+from gecar.reality.replay.rigid_alignment import starting_at
 from gecar.reality.start_pose.grid_search import FINE_SPOT_M, SAME_M, SAME_RAD, likely_starts, near
 from gecar.world.course.course import Course
 
@@ -42,15 +43,6 @@ RIVAL_COST = 1.5  # times the best fit's cost: a rival's
 SAME_PCT = 2.0  # readings that differ by less do not tell two places apart
 # Over so long readings of even floor change by less, in percent and in their noise.
 EVEN_S, EVEN_PCT, EVEN_SD = 0.5, 4.0, 6.0
-
-
-def starting_at(path: Array, start: Array) -> Array:
-    """Return a path that begins at another pose, turned and carried there as a whole, shape (rows, 3)."""
-    turn = start[2] - path[0, 2]
-    cos, sin = math.cos(turn), math.sin(turn)
-    arm = path[:, :2] - path[0, :2]
-    there = arm @ np.array([[cos, sin], [-sin, cos]]) + start[:2]
-    return np.column_stack([there, path[:, 2] + turn])
 
 
 def with_other_wheels(path: Array, change: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.optimisation.least_squares import least_squares, row_by_row
-from gecar.reality.start_pose.localise import starting_at
+from gecar.reality.replay.rigid_alignment import starting_at
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
