@@ -100,7 +100,7 @@ def _scan(
     least: float,
     best: Array,
 ) -> None:
-    """Try every start of a grid; write each heading's least cost and the start, shape (headings, 4).
+    """Try every start of a grid; write the best of each heading, shape (headings, 4): cost, x, y, heading.
 
     The grid is as fine as the floor is drawn: a row of starts sees a row of the floor, which vector instructions
     compare at once. A row is given up at twice the least cost of any start so far, ``least`` to begin with; the cost of

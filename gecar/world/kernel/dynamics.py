@@ -137,7 +137,7 @@ def step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any,
     grip = _grip(s, p) * c.dt
     s.left_circle = max(s.left_circle + grip * asked.left_load, 0.0) * max(1.0 + asked.left_grip, 0.0)
     s.right_circle = max(s.right_circle + grip * asked.right_load, 0.0) * max(1.0 + asked.right_grip, 0.0)
-    s.caster_circle = max(p.caster_friction + asked.caster, 0.0) * _caster_load(s, c) * c.dt
+    s.caster_circle = max(s.caster_circle + asked.caster * _caster_load(s, c) * c.dt, 0.0)
     release_contacts(s)
     if not sweep(s, c, True) and not sweep(s, c, True):
         sweep(s, c, True)
@@ -274,7 +274,7 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
 
 @kernel
 def _caster_load(s: Any, c: Any) -> float:
-    """Return the load on the caster [N]: static, plus what the last step's impulses ahead shift onto it."""
+    """Return the load on the caster [N]: its share of the weight, and what speeding up or braking shifts onto it."""
     ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
     return min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
 

@@ -389,7 +389,7 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
 
 @kernel
 def _turned(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
-    """Return what a law that turns what the camera sees about its point adds to x, y and heading."""
+    """Return by how much a turn of the camera's picture changes a pose: x, y [m] and heading [rad]."""
     dx, dy = v.of[0, _X] - laws.terms[k, AT_X], v.of[0, _Y] - laws.terms[k, AT_Y]
     v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = math.sqrt(dx * dx + dy * dy)
     turn = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2)
