@@ -54,6 +54,10 @@ class LinearResiduals:
         return replace(self, responses=responses, noise=self.noise[rows], count=len(numbers))
 
     @property
+    def reading_sd(self) -> np.ndarray:
+        return np.ones(len(self.noise))
+
+    @property
     def clock_offsets_s(self) -> np.ndarray:
         return np.zeros(self.count)
 

@@ -342,6 +342,19 @@ def test_beside_much_that_is_unexplained_the_effect_of_one_size_is_named(share: 
     assert stands_out(explained.problem, explained.steps[0])
 
 
+@pytest.mark.parametrize(("size", "kept"), [(0.8, True), (1.7, False)])  # explained: 93 %, 75 %
+def test_beside_a_path_that_is_off_what_moves_the_spot_must_explain_nearly_all(
+    size: float, kept: bool
+) -> None:
+    both = linear({VISCOUS: 3.0}, RESPONSES)
+    both = replace(both, noise=both.noise + unlike(RESPONSES[VISCOUS], 9, size))
+    seen = confirmed(explain(linear_problem(both)), set_aside([1.0]))  # type: ignore[arg-type]
+    assert [step.effect for step in seen.explained.steps] == [VISCOUS]
+    again = confirmation.standing_out(seen)
+    assert [step.effect for step in again.explained.steps] == [VISCOUS] * kept
+    assert [step.effect for step in again.candidates] == [VISCOUS] * (not kept)
+
+
 def test_an_effect_that_explains_next_to_nothing_is_uneven() -> None:
     explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
     (step,) = explained.steps

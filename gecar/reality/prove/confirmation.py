@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting.gain_offset import EFFECT as GAIN
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
@@ -24,7 +25,7 @@ from gecar.reality.selection.share import (
     sums_of_spans,
 )
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
-from gecar.reality.selection.thresholds import MAIN_SHARE, WORSE
+from gecar.reality.selection.thresholds import MAIN_SHARE, WHOLE_SHARE, WORSE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
@@ -219,14 +220,31 @@ def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
 
 
 def standing_out(seen: Confirmation) -> Confirmation:
-    """Drop effects whose size differs between recordings, one by one, those that differ most first.
+    """Drop effects that a wrong path may ask for, one by one, those whose size differs most between recordings first.
 
     For the colour sensor where the motion is unexplained: readings along a path that is off by itself ask for a sensor
-    that sits elsewhere, reads late, or looks wider.
+    that sits elsewhere, reads late, or looks wider. Where such effects leave much of what the readings are off by, the
+    path is what is off, and the weakest goes. A gain shows on even floor, where no path matters.
     """
-    while worst := most_uneven(seen.explained.problem, seen.explained.steps):
-        seen = _refused(seen, worst, drifts=True)
-    return seen
+    while True:
+        worst = most_uneven(seen.explained.problem, seen.explained.steps)
+        weakest = worst or _weakest_of_place(seen.explained)
+        if weakest is None:
+            return seen
+        seen = _refused(seen, weakest, drifts=worst is not None)
+
+
+def _weakest_of_place(explained: Explanation) -> Step | None:
+    """Return the effect that gains least of those that move what is seen; None if they explain nearly all of it."""
+    residuals = explained.problem.residuals
+    known, found = (
+        float(np.sum((residuals.errors(model.physics) ** 2 - 1.0) * residuals.reading_sd**2))
+        for model in (explained.problem.known, explained.taken)
+    )  # squared errors of readings [%^2], beyond what noise and the path's uncertainty make of them
+    if found <= (1.0 - WHOLE_SHARE) * known:
+        return None
+    of_place = [step for step in explained.steps if step.effect != GAIN]
+    return min(of_place, key=lambda step: step.gain, default=None)
 
 
 def _refused(seen: Confirmation, step: Step, drifts: bool = False) -> Confirmation:
