@@ -15,6 +15,8 @@ from benchmarks.concealed.sightings import sight
 from gecar.reality.discovery import discover
 from gecar.reality.recordings.recording import read_case
 
+FEW = "holds", "line", "reversals"  # recordings, where more than these would cost minutes and prove no more
+
 
 def examined(kind, effects, seed, out):
     draw_case("case", kind, effects, (seed,), out)
@@ -23,7 +25,8 @@ def examined(kind, effects, seed, out):
     return judge(read_label(out, "case"), verdict, sight(out, "case"))
 
 
-def test_nothing_concealed_is_given_no_name(tmp_path):
+def test_nothing_concealed_is_given_no_name(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "RUNS", FEW)
     assert examined("none", (), 1, tmp_path).named == ()
 
 
@@ -35,6 +38,5 @@ def test_concealed_effect_is_named_alone_and_located(tmp_path):
 
 
 def test_physics_outside_the_catalogue_is_given_no_name(tmp_path, monkeypatch):
-    # What nothing explains is explained three times: fewer recordings than the examination's save minutes.
-    monkeypatch.setattr(cases, "RUNS", ("holds", "line", "reversals"))
+    monkeypatch.setattr(cases, "RUNS", FEW)
     assert examined("outside", ("magnet",), 1, tmp_path).abstained
