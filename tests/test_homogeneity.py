@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from concealing import EV3, recorded
+from test_location import seen_on_the_course
+from test_start_pose import path_heading
 
 from gecar.reality.advise.notes import DRIFTS, notes_on
 from gecar.reality.noise.sensor_noise import estimate_noise
@@ -72,6 +74,22 @@ def test_grip_that_is_lost_on_the_way_has_not_and_stays_unexplained() -> None:
     (step,) = explained.drifting
     assert (step.effect, step.drifts) == (GRIP, True)
     assert step.gain > 50.0
+
+
+@pytest.mark.parametrize("leaning", [0.0, 0.04])
+def test_light_from_one_side_is_no_gain(leaning: float) -> None:
+    """White reads 6 % less; by as much on the mean where the light falls from one side."""
+    runs = []
+    for seed in range(4):
+        run = seen_on_the_course(seed, EV3)
+        dimmed = run.reflection_pct * (0.94 + leaning * np.cos(path_heading(run)))
+        runs.append(replace(run, reflection_pct=np.round(dimmed)))
+    moved = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    read = moved.with_paths(EV3.physics).of_sensor()
+    explained = explain(problem_of(read, EV3, ("sensor_gain", "sensor_delay")))
+    named, drifting = ([s.effect for s in steps] for steps in (explained.steps, explained.drifting))
+    assert named == ["sensor_gain"] * (not leaning)
+    assert drifting == ["sensor_gain"] * bool(leaning)
 
 
 def test_the_notes_say_why_what_drifts_is_no_finding() -> None:

@@ -18,6 +18,7 @@ AFTER_S = 0.4  # how long an event has an effect
 RESTING, SLOW_SHARE, FAST_SHARE = 0.15, 0.35, 0.7  # rad/s, and shares of the fastest shaft speed
 SMALL_DUTY, STEP = 0.25, 0.15
 TURNING, STRAIGHT = 1.5, 0.25  # rad/s
+HEADINGS = "heading +x", "heading +y", "heading -x", "heading -y"
 
 
 def regime_masks(
@@ -31,28 +32,41 @@ def regime_masks(
 
 
 def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mask]:
-    """Return the regimes that the motion and the commands themselves tell, by name, each of shape (rows,)."""
+    """Return the regimes that motion, commands and heading tell, by name, each of shape (rows,)."""
     lasting = max(int(AFTER_S / float(np.median(np.diff(run.replayer.t)))), 1)
-    return _motions(run.replayer.play(physics)[0], run.recording.commands, lasting)
+    rows = run.replayer.play(physics)[0]
+    pose, placed = _pose(run, rows)
+    return {**_motions(rows, run.recording.commands, lasting), **_headings(pose[:, 2], placed)}
 
 
 def _table(
     run: RecordingResiduals, physics: npt.NDArray[Any], bins: int, bin_s: float
 ) -> tuple[dict[str, Mask], Array]:
     rows, t = run.replayer.play(physics)[0], run.replayer.t
-    sensor_path, located = run.nuisances.path, run.nuisances.start is not None
-    pose = sensor_path.poses if located and sensor_path is not None else rows[:, [X, Y, HEADING]]
-    placed = located or run.replayer.has_poses
+    pose, placed = _pose(run, rows)
     centres = (np.arange(bins) + 0.5) * bin_s
     at = np.minimum(np.searchsorted(t, centres), len(t) - 1)
     there = centres <= t[-1]
     masks = _motions(rows[at], run.recording.commands[at], max(int(AFTER_S / bin_s), 1))
     masks["early"], masks["late"] = centres < t[-1] / 3.0, centres > 2.0 * t[-1] / 3.0
-    for name, way in (("heading +x", 0.0), ("heading +y", 0.5), ("heading -x", 1.0), ("heading -y", 1.5)):
-        masks[name] = (np.cos(pose[at, 2] - way * np.pi) > np.sqrt(0.5)) & ~masks["standing"] & placed
+    for name, mask in _headings(pose[at, 2], placed).items():
+        masks[name] = mask & ~masks["standing"]
     masks["on the line's edge"] = _edges(run, physics, at) if run.reads else np.zeros(bins, bool)
     path = np.where(there[:, None] & placed, pose[at, :2], np.nan)
     return {name: mask & there for name, mask in masks.items()}, path
+
+
+def _pose(run: RecordingResiduals, rows: Array) -> tuple[Array, bool]:
+    """Return the axle's pose at every row, shape (rows, 3) [m, m, rad], and whether its place on the floor is known."""
+    sensor_path, located = run.nuisances.path, run.nuisances.start is not None
+    pose = sensor_path.poses if located and sensor_path is not None else rows[:, [X, Y, HEADING]]
+    return pose, located or run.replayer.has_poses
+
+
+def _headings(heading: Array, placed: bool) -> dict[str, Mask]:
+    """Return the four regimes of the heading [rad], by name."""
+    ways = zip(HEADINGS, (0.0, 0.5, 1.0, 1.5), strict=True)
+    return {name: (np.cos(heading - way * np.pi) > np.sqrt(0.5)) & placed for name, way in ways}
 
 
 def _motions(rows: Array, duty: Array, lasting: int) -> dict[str, Mask]:

@@ -18,6 +18,7 @@ from scipy.stats import chi2
 
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
+from gecar.reality.residuals.regimes import HEADINGS
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import shares_of_groups
 from gecar.reality.selection.thresholds import DRIFTING, NEGLIGIBLE, SIGNIFICANCE
@@ -110,10 +111,11 @@ def heterogeneity(groups: Groups, without: Array, with_effect: Array) -> Heterog
 
 
 def _splits(problem: Problem, model: Model) -> Iterator[Groups]:
-    """Yield groups of the residuals: by recording, by thirds of the time, and by regimes of the motion."""
+    """Yield groups of the residuals: by recording, by thirds of the time, and by regimes of the motion or headings."""
     index = problem.residuals.index
     yield index.recording.astype(np.intp)
     yield np.minimum(THIRDS * index.t_s / max(float(index.t_s.max()), 1e-9), THIRDS - 1).astype(np.intp)
     masks = problem.residuals.regimes(model.physics)
-    for names in REGIMES:
+    # Light falls from one side; of the motion no effect looks at the heading alone.
+    for names in (*REGIMES, HEADINGS) if problem.residuals.sensor else REGIMES:
         yield np.select([masks[name] for name in names], range(1, len(names) + 1)).astype(np.intp)
