@@ -116,6 +116,6 @@ def _splits(problem: Problem, model: Model) -> Iterator[Groups]:
     yield index.recording.astype(np.intp)
     yield np.minimum(THIRDS * index.t_s / max(float(index.t_s.max()), 1e-9), THIRDS - 1).astype(np.intp)
     masks = problem.residuals.regimes(model.physics)
-    # Light falls from one side; of the motion no effect looks at the heading alone.
+    # Light from one side makes readings depend on the heading, and looks like a gain.
     for names in (*REGIMES, HEADINGS) if problem.residuals.sensor else REGIMES:
         yield np.select([masks[name] for name in names], range(1, len(names) + 1)).astype(np.intp)
