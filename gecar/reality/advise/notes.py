@@ -14,8 +14,11 @@ from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
-NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
-DRIFTS = "its size differs between recordings, times or kinds of motion: it imitates something else"
+NOT_CONFIRMED = (
+    "the held-out ones do not confirm it, its interval contains its neutral value, or what is wrong may be the "
+    "measured path"
+)
+DRIFTS = "its size differs between recordings, times, headings or kinds of motion: it imitates something else"
 LEFT_OUT = {
     "encoders": "The encoders have an error of their own, which no effect of the catalogue explains. They were left "
     "out: what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles.",
