@@ -4,8 +4,6 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check
-# Python compiles what it imports, when it does: of all that is installed, most is never imported.
-INSTALL := $(PIP) install --quiet --no-compile --editable
 ARGS ?=
 
 # The first Python here that is new enough; set it yourself with: make env PYTHON=/path/to/python3.12
@@ -65,12 +63,12 @@ $(PY):
 
 $(VENV)/.runtime: pyproject.toml | $(PY)
 	@echo "Installing gecar and its libraries into .venv (once) ..."
-	@$(INSTALL) .
+	@$(PIP) install --quiet --editable .
 	@touch $@
 
 $(VENV)/.test $(VENV)/.check $(VENV)/.docs $(VENV)/.cluster $(VENV)/.fuzz: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
-	@$(INSTALL) '.[$*]'
+	@$(PIP) install --quiet --editable '.[$*]'
 	@touch $@
 
 # MicroPython for the tests of exported programs. Without npm or a network those tests are skipped, and say so.
