@@ -14,10 +14,8 @@ from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
-NOT_CONFIRMED = (
-    "the held-out ones do not confirm it, its interval contains its neutral value, or what is wrong may be the "
-    "measured path"
-)
+NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
+OR_PATH = ", or the measured path is what is wrong"
 DRIFTS = "its size differs between recordings, times, headings or kinds of motion: it imitates something else"
 LEFT_OUT = {
     "encoders": "The encoders have an error of their own, which no effect of the catalogue explains. They were left "
@@ -66,8 +64,7 @@ def notes_on(
         The robot with the effects found.
     """
     notes = [
-        f"{step.effect} explains the fitted recordings, but {DRIFTS if step.drifts else NOT_CONFIRMED}: a candidate, "
-        "not a finding."
+        f"{step.effect} explains the fitted recordings, but {_why_refused(step)}: a candidate, not a finding."
         for step in candidates
     ]
     notes += [
@@ -105,6 +102,12 @@ def notes_on(
             f"Start poses found from sensor readings, up to places that look the same: {'; '.join(located)}."
         )
     return tuple(notes)
+
+
+def _why_refused(candidate: Step) -> str:
+    if candidate.drifts:
+        return DRIFTS
+    return NOT_CONFIRMED + OR_PATH * (BY_ID[candidate.effect].channels == ("sensor",))
 
 
 def _start(run: RecordingResiduals) -> str:

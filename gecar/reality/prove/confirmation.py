@@ -220,11 +220,11 @@ def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
 
 
 def standing_out(seen: Confirmation) -> Confirmation:
-    """Drop effects that a wrong path may ask for, one by one, those whose size differs most between recordings first.
+    """Drop effects of the colour sensor that may come from a wrong path: first those of uneven size, then weak ones.
 
-    For the colour sensor where the motion is unexplained: readings along a path that is off by itself ask for a sensor
-    that sits elsewhere, reads late, or looks wider. Where such effects leave much of what the readings are off by, the
-    path is what is off, and the weakest goes. A gain shows on even floor, where no path matters.
+    Where the motion is unexplained, the path may be off, and readings along it ask for a sensor that sits elsewhere,
+    reads late, or looks wider. Uneven is what differs in size between recordings. Where such effects leave much of the
+    readings' error, the weakest goes, one by one. A gain shows on even floor, where no path matters.
     """
     while True:
         worst = most_uneven(seen.explained.problem, seen.explained.steps)
@@ -235,7 +235,7 @@ def standing_out(seen: Confirmation) -> Confirmation:
 
 
 def _weakest_of_place(explained: Explanation) -> Step | None:
-    """Return the effect that gains least of those that move what is seen; None if they explain nearly all of it."""
+    """Return the weakest effect that moves the spot the sensor sees; None if nearly all of the error is explained."""
     residuals = explained.problem.residuals
     known, found = (
         float(np.sum((residuals.errors(model.physics) ** 2 - 1.0) * residuals.reading_sd**2))

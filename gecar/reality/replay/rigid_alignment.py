@@ -39,7 +39,7 @@ def pose_errors(measured: Array, simulated: Array, sd: Array) -> Array:
 
 
 def starting_at(path: Array, start: Array, began: Array | None = None) -> Array:
-    """Return a path that begins at another pose, turned and carried there as a whole, shape (rows, 3).
+    """Return a path moved and turned as a whole so that it begins at another pose, shape (rows, 3).
 
     ``began`` is where it began, if not at its first pose.
     """

@@ -32,7 +32,7 @@ def regime_masks(
 
 
 def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mask]:
-    """Return the regimes that motion, commands and heading tell, by name, each of shape (rows,)."""
+    """Return when the robot moves fast, turns, heads along +x and so on, as masks by name, each of shape (rows,)."""
     lasting = max(int(AFTER_S / float(np.median(np.diff(run.replayer.t)))), 1)
     rows = run.replayer.play(physics)[0]
     pose, placed = _pose(run, rows)
@@ -64,7 +64,7 @@ def _pose(run: RecordingResiduals, rows: Array) -> tuple[Array, bool]:
 
 
 def _headings(heading: Array, placed: bool) -> dict[str, Mask]:
-    """Return the four regimes of the heading [rad], by name."""
+    """Return when a robot heads along +x, +y, -x and -y, within 45 degrees, as masks by name."""
     ways = zip(HEADINGS, (0.0, 0.5, 1.0, 1.5), strict=True)
     return {name: (np.cos(heading - way * np.pi) > np.sqrt(0.5)) & placed for name, way in ways}
 

@@ -371,37 +371,38 @@ def sensor_shift(
 
 @subroutine
 def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
-    total = 0.0
+    total, axis = 0.0, port - PORT_POSE_X
     for k in range(int(laws.n_terms)):
         of_wheel = port == PORT_ENCODER
-        side = int(laws.terms[k, SIDE])
-        if int(laws.terms[k, PORT]) == port and (not of_wheel or side in (BOTH, hand)):
+        acts_at, side = int(laws.terms[k, PORT]), int(laws.terms[k, SIDE])
+        if acts_at == port and (not of_wheel or side in (BOTH, hand)):
             total += _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand if of_wheel else 2)
-        elif port in (PORT_POSE_X, PORT_POSE_Y) and int(laws.terms[k, PORT]) == _PORT_POSE_TOWARD:
-            total += _toward(laws, k, v)[port - PORT_POSE_X]
-        elif (
-            port in (PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING)
-            and int(laws.terms[k, PORT]) == _PORT_POSE_TURN
-        ):
-            total += _turned(laws, k, v)[port - PORT_POSE_X]
+        elif acts_at == _PORT_POSE_TOWARD and 0 <= axis < 2:
+            total += _toward(laws, k, v)[axis]
+        elif acts_at == _PORT_POSE_TURN and 0 <= axis < 3:
+            total += _turned(laws, k, v)[axis]
     return total
-
-
-@kernel
-def _turned(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
-    """Return by how much a turn of the camera's picture changes a pose: x, y [m] and heading [rad]."""
-    dx, dy = v.of[0, _X] - laws.terms[k, AT_X], v.of[0, _Y] - laws.terms[k, AT_Y]
-    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = math.sqrt(dx * dx + dy * dy)
-    turn = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2)
-    sine, less = math.sin(turn), math.cos(turn) - 1.0
-    return less * dx - sine * dy, sine * dx + less * dy, turn
 
 
 @kernel
 def _toward(laws: Any, k: int, v: Any) -> tuple[float, float]:
     """Return along x and y what a law gives toward its point."""
-    dx, dy = laws.terms[k, AT_X] - v.of[0, _X], laws.terms[k, AT_Y] - v.of[0, _Y]
-    distance = math.sqrt(dx * dx + dy * dy)
-    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = distance
-    pull = _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2) / max(distance, 1e-6)
+    dx, dy, value = _at_a_point(laws, k, v)
+    pull = value / max(v.of[0, _DISTANCE], 1e-6)
     return pull * dx, pull * dy
+
+
+@kernel
+def _turned(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
+    """Return how far a pose seems to move when the camera's picture turns about a point: x, y [m] and heading [rad]."""
+    dx, dy, turn = _at_a_point(laws, k, v)
+    sine, less = math.sin(turn), math.cos(turn) - 1.0
+    return sine * dy - less * dx, -sine * dx - less * dy, turn
+
+
+@kernel
+def _at_a_point(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
+    """Return the way from the robot to a law's point, along x and y [m], and what the law gives at that distance."""
+    dx, dy = laws.terms[k, AT_X] - v.of[0, _X], laws.terms[k, AT_Y] - v.of[0, _Y]
+    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = math.sqrt(dx * dx + dy * dy)
+    return dx, dy, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2)
