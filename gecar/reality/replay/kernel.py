@@ -30,7 +30,7 @@ from gecar.reality.replay.pose_filter import (
     predict_pose,
     rebase,
 )
-from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, is_plain, step_with_terms
+from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, step_with_terms
 from gecar.world.kernel.lock_step import (
     LANES,
     N_FIELDS,
@@ -250,7 +250,7 @@ def _begin(physics: npt.NDArray[Any], start: Array, dt: float, flat: Array, lane
 
 
 @kernel
-def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int, effects: bool) -> None:
+def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int) -> None:
     """Advance every lane by one step under the same commands."""
     if bench:
         for lane in range(lanes):
@@ -262,7 +262,7 @@ def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int, ef
         a = load_acting(flat, lanes, lane)
         a.left, a.right = left, right
         store_acting(flat, lanes, lane, a)
-    advance_lanes(flat, lanes, effects)
+    advance_lanes(flat, lanes, effects=True)
 
 
 @kernel
@@ -319,9 +319,10 @@ def _advance_with_terms(left: float, right: float, bench: bool, laws: Any, store
     store_derived(flat, 1, 0, c)
 
 
-def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # noqa: C901
-    """Return the compiled replay of so many robots, with effects or plain ones; or of one with terms.
+def _replay_kernel(lanes: int, terms: bool = False) -> Any:  # noqa: C901
+    """Return the compiled replay of so many robots, or of one with terms.
 
+    Plain robots have no replay of their own: few are among those that are fitted, and it took 20 s to compile.
     With terms ``inputs`` is overwritten: what they add to a reading is taken off what was measured.
     """
 
@@ -378,15 +379,15 @@ def _replay_kernel(lanes: int, effects: bool, terms: bool = False) -> Any:  # no
             if terms:
                 _advance_with_terms(left, right, inputs.bench, shared, stores[0], flat)
             else:
-                _advance(left, right, inputs.bench, flat, lanes, effects)
+                _advance(left, right, inputs.bench, flat, lanes)
             n += 1
 
     return kernel(replay)
 
 
-_replay_one = _replay_kernel(1, effects=True)
-_replay_lanes, _replay_plain_lanes = _replay_kernel(LANES, effects=True), _replay_kernel(LANES, effects=False)
-_replay_with_terms = _replay_kernel(1, effects=True, terms=True)
+_replay_one, _replay_lanes, _replay_with_terms = (
+    _replay_kernel(1), _replay_kernel(LANES), _replay_kernel(1, terms=True)
+)  # fmt: skip
 
 
 def replay_rows(
@@ -415,10 +416,8 @@ def replay_rows(
     if lanes == 1 and has_terms(physics)[0]:
         play = _replay_with_terms
         inputs = inputs._replace(measured=inputs.measured.copy(), pose=inputs.pose.copy())
-    elif lanes == 1:
-        play = _replay_one
     else:
-        play = _replay_plain_lanes if is_plain(physics).all() else _replay_lanes
+        play = _replay_one if lanes == 1 else _replay_lanes
     flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(1, STORES)
     play(inputs, np.ascontiguousarray(physics), start, offset, dt, flat, np.zeros(8), stores, kept)
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

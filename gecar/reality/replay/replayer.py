@@ -20,7 +20,6 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_input import KernelInput
 from gecar.reality.replay.rigid_alignment import moved_start
-from gecar.world.kernel.dynamics import is_plain
 from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
@@ -275,13 +274,12 @@ def _enters(rows: Array, physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
 
 
 def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_]) -> Iterator[list[int]]:
-    """Yield which of some records to replay together: up to `LANES` that share `TIMING`, plain ones apart.
+    """Yield which of some records to replay together: up to `LANES` that share `TIMING`.
 
     Few are replayed one by one, and so are those with terms.
     """
     alike: dict[Any, list[int]] = {}
-    chosen = physics[numbers]
-    keys = zip(chosen[list(TIMING)].tolist(), is_plain(chosen), strict=True)
+    keys = physics[numbers][list(TIMING)].tolist()
     for number, key in zip(numbers.tolist(), keys, strict=True):
         if physics["n_terms"][number] > 0.0:
             yield [number]
