@@ -24,6 +24,7 @@ from gecar.plots.style import is_whole
 from gecar.reality import discovery
 from gecar.reality.compare.choices import Told
 from gecar.reality.discovery import discover
+from gecar.reality.invent import invention
 from gecar.reality.invent.invention import Written
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import left_out_gains, simplified
@@ -44,6 +45,7 @@ from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import problem_of
+from gecar.reality.selection.stepwise import concluded, explain
 from gecar.reality.selection.thresholds import PRICE
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_html
@@ -264,6 +266,34 @@ def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, beside
     verdict = discover(Case("lag", runs), catalogue=catalogue, language=WHEELS_AND_LAG, invents=True)
     assert verdict.effects == ()
     assert [law.term.port for law in verdict.invented] == ["command"]
+
+
+@pytest.mark.parametrize("refused", [False, True], ids=["after the law", "before it"])
+def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, refused):
+    """After the law, which hides it till then; or taken back where no law holds without it."""
+    robot = robot_with(dict(SCRUB)).with_effects({"battery_resistance": {"resistance_ohm": 0.3}})
+    runs = [recorded(robot, seed) for seed in range(6)]
+    noise = estimate_noise(runs, EV3.physics, 1.0)
+    fitted, held = (motion_residuals(some, noise, 1.0, Threads(1)) for some in (runs[:4], runs[4:]))
+    catalogue = [*UNRELATED, BY_ID["battery_resistance"]]
+    problem = problem_of(fitted, EV3, observable(catalogue, fitted), held=held)
+    tried = explain(problem).tried
+    nothing = concluded(problem, problem.known, (), tried)
+    again = ()
+    if refused:
+        again = [step for step in tried[0] if step.effect == "battery_resistance"]
+        first_that_holds = invention._first_that_holds
+
+        def beside_effects_alone(written, first, library, *others):
+            return first_that_holds(written, first, library, *others) if library.model.effects else None
+
+        monkeypatch.setattr(invention, "_first_that_holds", beside_effects_alone)
+    written = invention.invent(nothing, held, FEW, refused=again)
+    assert [term.port for term in written.terms] == ["yaw_moment"]
+    assert [step.effect for step in written.explained.steps] == ["battery_resistance"]
+    values = written.explained.taken.values["battery_resistance"]
+    assert values["resistance_ohm"] == pytest.approx(0.3, rel=0.05)
+    assert written.terms[0].constants["c1"] == pytest.approx(-0.01, rel=0.05)
 
 
 def test_sizes_told_of_effects_are_those_fitted_beside_the_law():

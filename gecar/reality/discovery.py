@@ -375,9 +375,14 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 
 def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained: Explanation) -> _Stage:
     """Return a stage with this explanation in place of its own, and laws added to it."""
-    written = invent(explained, stage.held, language, context.seed, context.tell)
+    refused = {step.effect: step for step in stage.candidates if not explained.problem.on_bench}
+    written = invent(explained, stage.held, language, context.seed, context.tell, [*refused.values()])
     stage = replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
-    return replace(stage, spans=_spans(context, written.explained)) if written.terms else stage
+    if not written.terms:
+        return stage
+    named = {step.effect for step in written.explained.steps}
+    candidates = tuple(step for step in stage.candidates if step.effect not in named)
+    return replace(stage, candidates=candidates, spans=_spans(context, written.explained))
 
 
 def _left(stage: _Stage) -> float:

@@ -18,21 +18,25 @@ import numpy.typing as npt
 
 from gecar.language.grammar import Grammar
 from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.model import Effects, Model
+from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
-from gecar.reality.invent.search import Law, Library, search
+from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key
 from gecar.reality.invent.states import ranges
 from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
+from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.selection.acceptance import is_material, stands_out
+from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import share_asked_for, spread_of_size
-from gecar.reality.selection.stepwise import Explanation
-from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE, SEVERAL
+from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
+from gecar.reality.selection.thresholds import CLOSE, DRIFTING, MOST_EFFECTS, PRICE, SEVERAL
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
 from gecar.world.ports import AT_A_POINT, N_TERMS, PORTS
@@ -70,12 +74,17 @@ class Written:
     invented: tuple[Invented, ...]
 
 
+Held = tuple[Written, Law, list[Invented]]
+"""All laws with a new one, the new one, and what the verdict says of it."""
+
+
 def invent(
     explained: Explanation,
     held: Residuals,
     grammar: Grammar,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,  # noqa: ARG005
+    refused: Sequence[Step] = (),
 ) -> Written:
     """Write laws for what an explanation leaves, one after the other, as long as each proves itself.
 
@@ -91,17 +100,25 @@ def invent(
         Random seed.
     tell
         Called with a line of progress.
+    refused
+        Effects that were taken and are no findings: they may be beside a law, and a law may only hold beside them.
     """
     ports, problem = _ports(explained.problem), explained.problem
     known = problem.estimator.at(explained.taken, explained.taken.z)  # whitened as this problem has it
-    written = Written(replace(explained, taken=known), (), ())
+    first = replace(explained, taken=known)
+    written = Written(first, (), ())
     for number in range(MOST_LAWS):
         here = written.explained
         if len(here.problem.estimator.robot.term) == N_TERMS:
             break
         library = Library(here.problem, here.taken)
         found = search(library, grammar, ports, seed + number, tell, _unknown(problem))
-        holds = _first_that_holds(written, explained, library, found, held, seed) if found else None
+        nulls = largest_gains(library, seed) if found else np.zeros(0)
+        holds = _first_that_holds(written, first, library, found, held, nulls)
+        missing = [step for step in refused if step.effect not in first.taken.effects]
+        if holds is None and found and missing and not written.terms:
+            tell(f"laws beside {', '.join(step.effect for step in missing)}")
+            first, holds = _holds_beside(first, missing, found, held, nulls) or (first, None)
         if holds is None:
             break
         more, law, told = holds
@@ -110,7 +127,11 @@ def invent(
         # In mm of an EV3's wheel little of another motor is material: on a bench a law must prove itself, and no more.
         if not (written.explained.unexplained or problem.on_bench):
             break
-    return replace(written, invented=_with_constants_of(written, explained)) if written.terms else written
+    if not written.terms:
+        return Written(replace(explained, taken=known), (), ())
+    if not problem.on_bench:
+        written = _with_effects(written, first, held, {step.effect for step in refused})
+    return replace(written, invented=_with_constants_of(written, first))
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -147,13 +168,10 @@ def _first_that_holds(
     library: Library,
     found: Sequence[Law],
     held: Residuals,
-    seed: int,
-) -> tuple[Written, Law, list[Invented]] | None:
-    """Add the best law that is proved and that the held-out recordings confirm; None if there is none.
-
-    Returned are all laws with the new one, the new one, and what the verdict says of it.
-    """
-    for law, proof in _proved(library, found, largest_gains(library, seed)):
+    nulls: Array,
+) -> Held | None:
+    """Add the best law that is proved and that the held-out recordings confirm; None if there is none."""
+    for law, proof in _proved(library, found, nulls):
         more = _pruned(_added(written, first, library, law), first)
         gain = _gain_set_aside(written.explained, more.explained, held)
         if gain is not None:
@@ -183,14 +201,103 @@ def _spread(library: Library, law: Law) -> float:
 
 def _added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
     """Return laws with one more, all constants fitted together anew, and what is left then."""
-    problem, effects = first.problem, library.model.effects
-    terms = (*written.terms, *law.terms)
-    parameters = free(problem.estimator.robot, effects)
-    together = FreeTerms(parameters, law.minimum.z[: parameters.size], terms)
-    residual = library.problem.estimator.residual(together)
+    effects = library.model.effects
+    parameters = free(first.problem.estimator.robot, effects)
+    written = replace(written, terms=(*written.terms, *law.terms))
+    return _fitted_together(written, first, library.problem, effects, law.minimum.z[: parameters.size])
+
+
+def _fitted_together(
+    written: Written, first: Explanation, under: Problem, effects: Sequence[str], start: Array
+) -> Written:
+    """Return laws with all constants fitted anew, beside effects that begin at a vector, under a discrepancy."""
+    parameters = free(first.problem.estimator.robot, effects)
+    together = FreeTerms(parameters, start, written.terms)
+    residual = under.estimator.residual(together)
     found = least_squares(residual, together.z, together.bounds, together.probes, ROUNDS)
     terms, values = together.fitted(found.z), parameters.values(found.z[: parameters.size])
     return replace(written, explained=_explained_with(first, terms, effects, values), terms=terms)
+
+
+def _with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
+    """Add effects that stand out only beside the laws, one by one, as long as all hold with the laws fitted anew.
+
+    Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings. Robots
+    with laws are not replayed in lock step: those effects alone are tried that gained something without a law.
+    """
+    gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
+    problem = first.problem
+    first = replace(first, problem=replace(problem, refused=frozenset(problem.catalogue) - gained - refused))
+    while len(written.explained.taken.effects) < MOST_EFFECTS:
+        more = _with_one_more(written, first, held)
+        if more is None:
+            break
+        written = more
+    return written
+
+
+def _with_one_more(written: Written, first: Explanation, held: Residuals) -> Written | None:
+    """Return laws and effects with the best effect that holds beside them; None if none does."""
+    here = written.explained
+    problem = replace(here.problem, refused=first.problem.refused)
+    stage = tuple(candidate_steps(problem, here.taken))
+    tried = (*here.tried, stage)
+    for step in proved_steps(problem, stage):
+        steps = (*here.steps, replace(step, stage=len(tried) - 1))
+        start = free(first.problem.estimator.robot, step.model.effects).vector(step.model.values)
+        beside, under = replace(first, steps=steps, tried=tried), problem.under(step.model)
+        more = _fitted_together(written, beside, under, step.model.effects, start)
+        if _all_hold(more.explained, held):
+            return more
+    return None
+
+
+def _holds_beside(
+    explained: Explanation, refused: Sequence[Step], found: Sequence[Law], held: Residuals, nulls: Array
+) -> tuple[Explanation, Held] | None:
+    """Return the first law that holds beside effects that had been refused, if all that are left of these hold, too.
+
+    Each effect is taken back alone, then all: one may have stood in for the law. What explains most is tried first. The
+    laws are those found without them; what the residuals then left is more, and so is what chance gives a law.
+    """
+    tried = []
+    for some in (*([step] for step in refused), *([refused] if len(refused) > 1 else ())):
+        first = _taken_back(explained, some)
+        library = Library(first.problem, first.taken)
+        laws = sorted((fit(library, law.terms) for law in found), key=lambda law: -law.worth)
+        physics = laws[0].parameters.physics(laws[0].minimum.z)
+        cost_of_all = explained.problem.estimator.cost_of(explained.problem.residuals.errors(physics))
+        tried.append((cost_of_all + PRICE * len(some), first, library, laws))
+    for _, first, library, laws in sorted(tried, key=lambda each: each[0]):
+        holds = _first_that_holds(Written(first, (), ()), first, library, laws, held, nulls)
+        if holds and _all_hold(holds[0].explained, held):
+            return first, holds
+    return None
+
+
+def _taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
+    """Return an explanation with effects that had been refused."""
+    values = {step.effect: step.model.values[step.effect] for step in refused}
+    effects = [*explained.taken.effects, *values]
+    problem = explained.problem.under(explained.taken, effects)
+    model = problem.estimator.fit(effects, {**values, **explained.taken.values})
+    steps = (*explained.steps, *(replace(step, stage=0) for step in refused))
+    return replace(explained, problem=problem, taken=model, whole=model, steps=steps)
+
+
+def _all_hold(explained: Explanation, held: Residuals) -> bool:
+    """Whether all effects beside laws are material, of one size, and asked for by the recordings set aside.
+
+    Where much is left they must stand out of it, as effects without laws must.
+    """
+    problem, model = explained.problem, explained.taken
+    for step in explained.steps:
+        alone = beside_others(problem, model, step)
+        if not is_material(problem, model, alone) or drifts(problem, model, alone):
+            return False
+        if explained.unexplained and not stands_out(problem, alone):
+            return False
+    return len(confirmed(explained, held).explained.steps) == len(explained.steps)
 
 
 def _pruned(written: Written, first: Explanation) -> Written:

@@ -44,7 +44,7 @@ def _judged(problem: Problem, step: Step) -> tuple[Array, float, float]:
     base, model = estimator.models_of(step)
     alone = replace(step, base=base, model=model, gain=base.cost - model.cost)
     gains = left_out_gains(estimator, alone, problem.on_bench)
-    nulls = largest_gains(estimator, problem.catalogue, model)
+    nulls = largest_gains(estimator, problem.tried, model)
     p = float((1 + np.sum(nulls >= gains.sum())) / (1 + len(nulls)))
     return gains, float(np.quantile(nulls, 0.95)), p
 

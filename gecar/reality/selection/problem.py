@@ -84,6 +84,11 @@ class Problem:
         return found
 
     @property
+    def tried(self) -> tuple[str, ...]:
+        """Effects of the catalogue that may be taken."""
+        return tuple(effect for effect in self.catalogue if effect not in self.refused)
+
+    @property
     def residuals(self) -> Residuals:
         """What effects are fitted to."""
         return self.estimator.residuals

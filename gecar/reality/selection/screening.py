@@ -68,7 +68,7 @@ class _Trial:
 def candidate_steps(problem: Problem, model: Model) -> list[Step]:
     """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
     estimator = problem.estimator
-    others = [e for e in problem.catalogue if e not in model.effects and e not in problem.refused]
+    others = [effect for effect in problem.tried if effect not in model.effects]
     estimator.sensitivities(model, others)  # all at once, in lock step
     scored = (problem.once("scored", model.key, e, make=partial(_scored, problem, model, e)) for e in others)
     trials = [trial for trial in scored if trial]

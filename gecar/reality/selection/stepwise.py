@@ -7,7 +7,7 @@ it gains beside that. Source: forward, backward and stepwise selection, Draper a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from gecar.reality.fitting.model import Model, Step
@@ -159,7 +159,7 @@ def concluded(
             break
         model = _fitted_anew(problem, model, kept)
         problem = problem.under(model)
-        steps = [_beside_others(problem, model, step) for step in kept]
+        steps = [beside_others(problem, model, step) for step in kept]
     minor = tuple(step for step in steps if not is_material(problem, model, step))
     named, whole = tuple(step for step in steps if step not in minor), model
     if minor:  # what carries no claim bends no other effect's size
@@ -216,7 +216,7 @@ def _fitted_anew(problem: Problem, model: Model, kept: Sequence[Step]) -> Model:
     return problem.under(problem.known, effects).estimator.fit(effects, model.values)
 
 
-def _beside_others(problem: Problem, model: Model, step: Step) -> Step:
+def beside_others(problem: Problem, model: Model, step: Step) -> Step:
     """Return a step on top of a model's other effects, with what is known of how it was taken."""
     rest = [effect for effect in model.effects if effect != step.effect]
     estimator = problem.under(model, rest).estimator
@@ -294,10 +294,15 @@ def _best(problem: Problem, stage: Sequence[Step]) -> Step | None:
 
     On a bench, where many fit alike, the one that gains most on them.
     """
-    found = filter(proved, (judged(problem, step) for step in candidates(problem, stage)))
+    found = proved_steps(problem, stage)
     if problem.on_bench:
         return max(found, key=lambda step: float(step.left_out.sum()), default=None)
     return next(found, None)
+
+
+def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
+    """Yield a stage's candidates that gain on left-out recordings, best first."""
+    return filter(proved, (judged(problem, step) for step in candidates(problem, stage)))
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
