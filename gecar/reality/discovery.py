@@ -375,7 +375,7 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 
 def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained: Explanation) -> _Stage:
     """Return a stage with this explanation in place of its own, and laws added to it."""
-    refused = {step.effect: step for step in stage.candidates if not explained.problem.on_bench}
+    refused = {step.effect: step for step in stage.candidates}  # each once, as it was taken last
     written = invent(explained, stage.held, language, context.seed, context.tell, [*refused.values()])
     stage = replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
     if not written.terms:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -74,8 +75,25 @@ class Written:
     invented: tuple[Invented, ...]
 
 
-Held = tuple[Written, Law, list[Invented]]
-"""All laws with a new one, the new one, and what the verdict says of it."""
+class _Proven(NamedTuple):
+    """A law that holds.
+
+    Attributes
+    ----------
+    first
+        The explanation without any law.
+    written
+        All laws, with this one.
+    law
+        The law.
+    told
+        What the verdict says of it, but for its constants.
+    """
+
+    first: Explanation
+    written: Written
+    law: Law
+    told: list[Invented]
 
 
 def invent(
@@ -116,19 +134,19 @@ def invent(
         nulls = largest_gains(library, seed) if found else np.zeros(0)
         holds = _first_that_holds(written, first, library, found, held, nulls)
         missing = [step for step in refused if step.effect not in first.taken.effects]
-        if holds is None and found and missing and not written.terms:
+        if holds is None and found and missing and not (written.terms or problem.on_bench):
             tell(f"laws beside {', '.join(step.effect for step in missing)}")
-            first, holds = _holds_beside(first, missing, found, held, nulls) or (first, None)
+            holds = _first_beside(missing, first, found, held, nulls)
         if holds is None:
             break
-        more, law, told = holds
+        first, more, law, told = holds
         written = replace(more, invented=(*written.invented, *told))
         tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in law.terms)}")
         # In mm of an EV3's wheel little of another motor is material: on a bench a law must prove itself, and no more.
         if not (written.explained.unexplained or problem.on_bench):
             break
     if not written.terms:
-        return Written(replace(explained, taken=known), (), ())
+        return written
     if not problem.on_bench:
         written = _with_effects(written, first, held, {step.effect for step in refused})
     return replace(written, invented=_with_constants_of(written, first))
@@ -169,13 +187,14 @@ def _first_that_holds(
     found: Sequence[Law],
     held: Residuals,
     nulls: Array,
-) -> Held | None:
+) -> _Proven | None:
     """Add the best law that is proved and that the held-out recordings confirm; None if there is none."""
     for law, proof in _proved(library, found, nulls):
         more = _pruned(_added(written, first, library, law), first)
         gain = _gain_set_aside(written.explained, more.explained, held)
         if gain is not None:
-            return more, law, _told(library, law, _indistinguishable(law, found), proof, gain)
+            told = _told(library, law, _indistinguishable(law, found), proof, gain)
+            return _Proven(first, more, law, told)
     return None
 
 
@@ -203,20 +222,37 @@ def _added(written: Written, first: Explanation, library: Library, law: Law) -> 
     """Return laws with one more, all constants fitted together anew, and what is left then."""
     effects = library.model.effects
     parameters = free(first.problem.estimator.robot, effects)
-    written = replace(written, terms=(*written.terms, *law.terms))
-    return _fitted_together(written, first, library.problem, effects, law.minimum.z[: parameters.size])
+    terms, start = (*written.terms, *law.terms), law.minimum.z[: parameters.size]
+    return _written_with(written, first, _together(first, library.problem, terms, effects, start))
 
 
-def _fitted_together(
-    written: Written, first: Explanation, under: Problem, effects: Sequence[str], start: Array
-) -> Written:
-    """Return laws with all constants fitted anew, beside effects that begin at a vector, under a discrepancy."""
+class _Together(NamedTuple):
+    """Laws and effects whose constants were fitted together: both, the effects' values, and what they cost."""
+
+    terms: tuple[Term, ...]
+    effects: tuple[str, ...]
+    values: Effects
+    cost: float
+
+
+def _together(
+    first: Explanation, under: Problem, terms: tuple[Term, ...], effects: Sequence[str], start: Array
+) -> _Together:
+    """Fit all constants of laws and effects; these begin at the vector ``start``, under a problem's discrepancy."""
     parameters = free(first.problem.estimator.robot, effects)
-    together = FreeTerms(parameters, start, written.terms)
+    together = FreeTerms(parameters, start, terms)
     residual = under.estimator.residual(together)
     found = least_squares(residual, together.z, together.bounds, together.probes, ROUNDS)
-    terms, values = together.fitted(found.z), parameters.values(found.z[: parameters.size])
-    return replace(written, explained=_explained_with(first, terms, effects, values), terms=terms)
+    values = parameters.values(found.z[: parameters.size])
+    return _Together(together.fitted(found.z), tuple(effects), values, found.cost)
+
+
+def _written_with(
+    written: Written, first: Explanation, fitted: _Together, under: Problem | None = None
+) -> Written:
+    """Return laws as they were fitted together with effects, and what is left then; ``under`` as `_explained_with`."""
+    explained = _explained_with(first, fitted.terms, fitted.effects, fitted.values, under)
+    return replace(written, explained=explained, terms=fitted.terms)
 
 
 def _with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
@@ -226,36 +262,37 @@ def _with_effects(written: Written, first: Explanation, held: Residuals, refused
     with laws are not replayed in lock step: those effects alone are tried that gained something without a law.
     """
     gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
-    problem = first.problem
-    first = replace(first, problem=replace(problem, refused=frozenset(problem.catalogue) - gained - refused))
+    left_out = frozenset(first.problem.catalogue) - gained - refused
     while len(written.explained.taken.effects) < MOST_EFFECTS:
-        more = _with_one_more(written, first, held)
+        more = _with_one_more(written, first, held, left_out)
         if more is None:
             break
         written = more
     return written
 
 
-def _with_one_more(written: Written, first: Explanation, held: Residuals) -> Written | None:
-    """Return laws and effects with the best effect that holds beside them; None if none does."""
+def _with_one_more(
+    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
+) -> Written | None:
+    """Return laws and effects with the best effect that holds beside them, of those not left out; None if none does."""
     here = written.explained
-    problem = replace(here.problem, refused=first.problem.refused)
+    problem = replace(here.problem, refused=left_out)
     stage = tuple(candidate_steps(problem, here.taken))
     tried = (*here.tried, stage)
     for step in proved_steps(problem, stage):
-        steps = (*here.steps, replace(step, stage=len(tried) - 1))
-        start = free(first.problem.estimator.robot, step.model.effects).vector(step.model.values)
-        beside, under = replace(first, steps=steps, tried=tried), problem.under(step.model)
-        more = _fitted_together(written, beside, under, step.model.effects, start)
+        effects, steps = step.model.effects, (*here.steps, replace(step, stage=len(tried) - 1))
+        start = free(first.problem.estimator.robot, effects).vector(step.model.values)
+        fitted = _together(first, problem.under(step.model), written.terms, effects, start)
+        more = _written_with(written, replace(first, steps=steps, tried=tried), fitted)
         if _all_hold(more.explained, held):
             return more
     return None
 
 
-def _holds_beside(
-    explained: Explanation, refused: Sequence[Step], found: Sequence[Law], held: Residuals, nulls: Array
-) -> tuple[Explanation, Held] | None:
-    """Return the first law that holds beside effects that had been refused, if all that are left of these hold, too.
+def _first_beside(
+    refused: Sequence[Step], explained: Explanation, found: Sequence[Law], held: Residuals, nulls: Array
+) -> _Proven | None:
+    """Return the first law that holds beside refused effects, if those that are still needed then hold, too.
 
     Each effect is taken back alone, then all: one may have stood in for the law. What explains most is tried first. The
     laws are those found without them; what the residuals then left is more, and so is what chance gives a law.
@@ -270,13 +307,13 @@ def _holds_beside(
         tried.append((cost_of_all + PRICE * len(some), first, library, laws))
     for _, first, library, laws in sorted(tried, key=lambda each: each[0]):
         holds = _first_that_holds(Written(first, (), ()), first, library, laws, held, nulls)
-        if holds and _all_hold(holds[0].explained, held):
-            return first, holds
+        if holds and _all_hold(holds.written.explained, held):
+            return holds
     return None
 
 
 def _taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
-    """Return an explanation with effects that had been refused."""
+    """Return an explanation with refused effects taken again, all parameters fitted anew."""
     values = {step.effect: step.model.values[step.effect] for step in refused}
     effects = [*explained.taken.effects, *values]
     problem = explained.problem.under(explained.taken, effects)
@@ -306,14 +343,10 @@ def _pruned(written: Written, first: Explanation) -> Written:
     for effect in written.explained.taken.effects:
         here = written.explained.taken
         rest = tuple(e for e in here.effects if e != effect)
-        parameters = free(first.problem.estimator.robot, rest)
-        without = FreeTerms(parameters, parameters.vector(here.values), written.terms)
-        residual = problem.estimator.residual(without)
-        found = least_squares(residual, without.z, without.bounds, without.probes, ROUNDS)
-        if found.cost - here.cost < PRICE:
-            terms, values = without.fitted(found.z), parameters.values(found.z[: parameters.size])
-            explained = _explained_with(first, terms, rest, values, problem)
-            written = replace(written, explained=explained, terms=terms)
+        start = free(first.problem.estimator.robot, rest).vector(here.values)
+        without = _together(first, problem, written.terms, rest, start)
+        if without.cost - here.cost < PRICE:
+            written = _written_with(written, first, without, problem)
     return written
 
 
