@@ -13,6 +13,7 @@ from gecar.reality.replay.replayer import Prediction, Replayer
 Array = npt.NDArray[np.float64]
 # Over this the difference between camera and replay is averaged: long against a frame, short against an error's growth.
 SMOOTH_S = 0.12
+REACH, FAR = 7.5, 1e-12  # normal weights beyond so many deviations are less than what all values weigh
 
 
 def measured_path(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
@@ -47,13 +48,23 @@ def late_s(replayer: Replayer, physics: npt.NDArray[Any]) -> float:
 
 
 def _smoothed(t: Array, values: Array, at: Array) -> Array:
-    """Return local straight-line fits with normal weights, shape of ``at``."""
+    """Return local straight-line fits with normal weights, shape of ``at``; times are in order.
+
+    In a gap wider than normal weights reach all values count, each alike and by very little.
+    """
     if len(t) < 2:
         return np.full(len(at), values.mean() if len(values) else 0.0)
     grid = np.arange(at[0], at[-1] + 0.02, 0.02)
-    reach = grid[:, None] - t[None, :]
-    w = np.exp(-0.5 * (reach / SMOOTH_S) ** 2) + 1e-12
-    s0, s1, s2 = w.sum(1), (w * reach).sum(1), (w * reach**2).sum(1)
-    v0, v1 = w @ values, (w * reach) @ values
+    first, end = (np.searchsorted(t, grid + side * REACH * SMOOTH_S) for side in (-1.0, 1.0))
+    near = first[:, None] + np.arange(max(int((end - first).max()), 1))
+    there, near = near < end[:, None], np.minimum(near, len(t) - 1)
+    reach = grid[:, None] - t[near]
+    w = np.where(there, np.exp(-0.5 * (reach / SMOOTH_S) ** 2), 0.0)
+    far = FAR * np.stack([np.ones(len(t)), values, t, t * values, t * t]).sum(axis=1)
+    s0 = w.sum(1) + far[0]
+    s1 = (w * reach).sum(1) + grid * far[0] - far[2]
+    s2 = (w * reach**2).sum(1) + grid**2 * far[0] - 2.0 * grid * far[2] + far[4]
+    v0 = (w * values[near]).sum(1) + far[1]
+    v1 = (w * reach * values[near]).sum(1) + grid * far[1] - far[3]
     line = (v0 * s2 - v1 * s1) / (s0 * s2 - s1 * s1 + 1e-30)
     return np.interp(at, grid, line)

@@ -63,8 +63,9 @@ def limits(problem: Problem, model: Model, held: Residuals) -> dict[str, Limit |
     others = [effect for effect in problem.catalogue if effect not in model.effects]
     rivals = dict(zip(others, map(_directions, problem.estimator.sensitivities(model, others)), strict=True))
     clocked = problem.with_its_clocks(held, model.physics)
-    aside = _Held(clocked, clocked.errors(problem.with_small_changes(model)))
-    return {effect: _Search(problem, model, aside, rivals, effect).limit() for effect in others}
+    aside = _Held(clocked, clocked.errors(model.physics), clocked.errors(problem.with_small_changes(model)))
+    none = problem.residuals.errors(model.physics)
+    return {effect: _Search(problem, model, none, aside, rivals, effect).limit() for effect in others}
 
 
 def _directions(slopes: Array) -> Array:
@@ -73,10 +74,11 @@ def _directions(slopes: Array) -> Array:
 
 
 class _Held(NamedTuple):
-    """Residuals of the recordings set aside, and what they are under the model found."""
+    """Residuals of the recordings set aside; what they are under the model found, and that with small changes."""
 
     residuals: Residuals
-    errors: Array
+    none: Array
+    noise: Array
 
 
 class _Search:
@@ -86,6 +88,8 @@ class _Search:
     ----------
     problem, model
         As `limits` takes them.
+    none
+        The model's residuals in units of the sensors' noise, shape (n,).
     held
         The recordings set aside.
     rivals
@@ -95,9 +99,15 @@ class _Search:
     """
 
     def __init__(
-        self, problem: Problem, model: Model, held: _Held, rivals: Mapping[str, Array], effect: str
+        self,
+        problem: Problem,
+        model: Model,
+        none: Array,
+        held: _Held,
+        rivals: Mapping[str, Array],
+        effect: str,
     ) -> None:
-        self._problem, self._model, self._held, self._effect = problem, model, held, effect
+        self._problem, self._model, self._none, self._held, self._effect = problem, model, none, held, effect
         self._rivals = [directions for other, directions in rivals.items() if other != effect]
         self._parameters = free(problem.estimator.robot, (*model.effects, effect))
         coordinates = self._parameters.coordinates
@@ -132,13 +142,13 @@ class _Search:
         low, high = (float(bound[k]) for bound in self._parameters.bounds)
         scale = side * (1.0 if not coordinate.inverse else high / LARGEST)
         sizes = scale * np.geomspace(self._problem.share(coordinate.parameter), LARGEST, TRIED)
-        vectors = np.tile(start, (TRIED + 1, 1))
-        vectors[:, k] = np.clip(np.r_[0.0, sizes], low, high)
-        before, none = 0.0, vectors[0]
+        vectors = np.tile(start, (TRIED, 1))
+        vectors[:, k] = np.clip(sizes, low, high)
+        before = 0.0
         for n, (margin, change) in enumerate(self._tried(vectors)):
-            z = vectors[n + 1]
-            matters = margin >= 1.0 and self._matters(none, z)
-            now = min(margin, self._confirmed(none, z, change)) if matters else margin
+            z = vectors[n]
+            matters = margin >= 1.0 and self._matters(z)
+            now = min(margin, self._confirmed(z, change)) if matters else margin
             if matters and now >= 1.0:
                 found = z[k] if n == 0 or before >= 1.0 else _between(sizes[n - 1 : n + 1], before, now)
                 return float(np.clip(MARGIN * found, low, high))
@@ -146,11 +156,10 @@ class _Search:
         return math.inf
 
     def _tried(self, vectors: Array) -> Iterator[tuple[float, Array]]:
-        """Yield the margin (`_margins`) and the change of residuals of each vector after the first, neutral one."""
+        """Yield the margin (`_margins`) and the change of residuals of each vector."""
         errors = self._problem.residuals.errors_of_each
-        none = errors(self._parameters.physics(vectors[:1]))[0]
-        for first in range(1, len(vectors), AT_ONCE):  # most limits are small
-            changes = errors(self._parameters.physics(vectors[first : first + AT_ONCE])) - none
+        for first in range(0, len(vectors), AT_ONCE):  # most limits are small
+            changes = errors(self._parameters.physics(vectors[first : first + AT_ONCE])) - self._none
             yield from zip(self._margins(changes).tolist(), changes, strict=True)
 
     def _margins(self, changes: Array) -> Array:
@@ -167,16 +176,16 @@ class _Search:
         )
         return np.asarray(np.minimum(shown / NEEDED, own * shown / APART))
 
-    def _confirmed(self, without: Array, with_it: Array, change: Array) -> float:
+    def _confirmed(self, z: Array, change: Array) -> float:
         """Return by which factor recordings set aside exceed what is needed to confirm an effect of one size.
 
         The share of it that they ask for is 1, give or take its standard deviation; with the small changes that make up
         for it where it is absent, or without them. An effect that they do not show must show in two others.
         """
-        problem, (held, noise), physics = self._problem, self._held, self._parameters.physics
+        problem, (held, before, noise) = self._problem, self._held
         if not held.recordings:
             return math.inf
-        before, after = held.errors_of_each(np.concatenate([physics(without), physics(with_it)]))
+        after = held.errors(self._parameters.physics(z))
         least = least_share_expected(held.index, noise, after - before, SURE)
         if math.isinf(least):
             shown = np.bincount(problem.residuals.index.recording, change**2) >= LEAST_SHOWN
@@ -186,12 +195,12 @@ class _Search:
             least = min(least, least_share_expected(held.index, noise, after - made_up, SURE))
         return 1.0 / (1.0 - least)
 
-    def _matters(self, without: Array, with_it: Array) -> bool:
+    def _matters(self, z: Array) -> bool:
         """Whether a size is worth a name and material."""
         problem, parameters = self._problem, self._parameters
-        if not worthwhile(parameters, with_it, self._effect, problem.share):
+        if not worthwhile(parameters, z, self._effect, problem.share):
             return False
-        size = problem.sizes.apart(parameters.physics(without), parameters.physics(with_it))
+        size = problem.sizes.apart(self._model.physics, parameters.physics(z))
         return problem.material.times(size) >= 1.0
 
 
