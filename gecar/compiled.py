@@ -73,15 +73,15 @@ CACHE = _cache_folder()
 setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares its settings at run time
 
 
-def is_cold() -> bool:
-    """Whether no command has compiled all it needs here yet."""
-    return not (CACHE / "complete").exists()
+def is_cold(what: str = "complete") -> bool:
+    """Whether no command has compiled all it needs here yet, or all of one part."""
+    return not (CACHE / what).exists()
 
 
-def mark_warm() -> None:
-    """Remember that a command has compiled all it needs."""
+def mark_warm(what: str = "complete") -> None:
+    """Remember that a command has compiled all it needs, or all of one part."""
     with suppress(OSError):
-        (CACHE / "complete").touch()
+        (CACHE / what).touch()
 
 
 def compiled(function: F) -> F:

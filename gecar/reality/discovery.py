@@ -43,6 +43,7 @@ from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out
 from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
+from gecar.reality.residuals.compilation import compiled_replays
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of, stands_out, worsens
@@ -170,7 +171,7 @@ def discover(
         invents,
         about,
     )
-    with Threads(workers) as threads:
+    with compiled_replays(language is not None, tell), Threads(workers) as threads:
         return _discover(case.name, context, threads)
 
 

@@ -14,6 +14,8 @@ from typing import Self, TypeVar
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+CORES = os.cpu_count() or 1
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -30,7 +32,7 @@ class Threads:
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        self._workers = workers or os.cpu_count() or 1
+        self._workers = workers or CORES
         self._pool: ThreadPoolExecutor | None = None
         self._limits: threadpool_limits | None = None
 
