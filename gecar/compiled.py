@@ -74,12 +74,12 @@ setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares it
 
 
 def is_cold(what: str = "complete") -> bool:
-    """Whether no command has compiled all it needs here yet, or all of one part."""
+    """Whether all that a command needs, or one part of it, has yet to be compiled here."""
     return not (CACHE / what).exists()
 
 
 def mark_warm(what: str = "complete") -> None:
-    """Remember that a command has compiled all it needs, or all of one part."""
+    """Remember that all that a command needs, or one part of it, has been compiled here."""
     with suppress(OSError):
         (CACHE / what).touch()
 

@@ -10,26 +10,22 @@ from pathlib import Path
 import pytest
 from command import Command
 
-from gecar.compiled import is_cold
+from gecar.compiled import is_cold, mark_warm
 from gecar.reality.residuals import compilation, threads
 
 # Tests run on every core: a second thread would cost each discovery a quarter more processor time.
 if "PYTEST_XDIST_WORKER" in os.environ:
     threads.CORES = 1
 
-# What takes longest to compile, in shares alike: else every worker compiles all of it at the same time.
-SHARES = (
-    ["-c", "import gecar.parallel.warm_up"],
-    ["-m", compilation.MODULE, "one", "readings", "lanes"],
-    ["-m", compilation.MODULE, "laws"],
-)
-
 
 def pytest_xdist_setupnodes() -> None:
-    """Compile before there are workers, where nothing has been yet."""
-    if is_cold():
-        for child in [subprocess.Popen([sys.executable, *share]) for share in SHARES]:
+    """Compile what takes longest before there are workers: else each of them compiles all of it at the same time."""
+    if is_cold(compilation.REPLAYS):
+        drives = subprocess.Popen([sys.executable, "-c", "import gecar.parallel.warm_up"])
+        replays = [compilation.compiling("one", "readings", "lanes"), compilation.compiling("laws")]
+        for child in (drives, *replays):
             child.wait()
+        mark_warm(compilation.REPLAYS)
 
 
 @pytest.fixture

@@ -48,9 +48,9 @@ def late_s(replayer: Replayer, physics: npt.NDArray[Any]) -> float:
 
 
 def _smoothed(t: Array, values: Array, at: Array) -> Array:
-    """Return local straight-line fits with normal weights, shape of ``at``; times are in order.
+    """Return straight lines fitted locally, with normal weights, shape of ``at``; times ``t`` increase.
 
-    In a gap wider than normal weights reach all values count, each alike and by very little.
+    In a gap that is wider than those weights reach, all values count alike.
     """
     if len(t) < 2:
         return np.full(len(at), values.mean() if len(values) else 0.0)

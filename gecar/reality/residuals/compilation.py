@@ -1,4 +1,4 @@
-"""Compiles what replays run on, in several processes at once: a kernel takes 5 to 20 s, once on a machine.
+"""The kernels of replays, compiled by several processes at once: each takes 5 to 20 s, once on a machine.
 
 In one process Numba compiles one function at a time; what it made is kept on disk for all others.
 """
@@ -27,16 +27,16 @@ from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot, load_robot
 from gecar.world.terms import Term
 
-MODULE = "gecar.reality.residuals.compilation"
 REPLAYS = "replays"
 LAW = Term(port="yaw_moment", law="a", a=0.0)  # all laws run in one kernel
 
 
 @contextmanager
 def compiled_replays(laws: bool, tell: Callable[[str], None]) -> Iterator[None]:
-    """Compile the kernels of replays first where no process has; the one for laws, if any are wanted, meanwhile.
+    """Compile the kernels of replays before a block of code runs, unless that was done on this machine.
 
-    One that fails here is compiled where it is called first.
+    The kernel for laws, if any are wanted, is compiled while the block runs. One that fails is compiled where it is
+    called first.
     """
     if not is_cold(REPLAYS) or not os.access(CACHE, os.W_OK):
         yield
@@ -57,9 +57,9 @@ def compiled_replays(laws: bool, tell: Callable[[str], None]) -> Iterator[None]:
 
 
 def compiling(*kernels: str) -> subprocess.Popen[bytes]:
-    """Begin to compile some of `KERNELS` in a process of its own."""
+    """Start a process that compiles some of `KERNELS`."""
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", MODULE, *kernels]
+    command = [sys.executable, "-m", __name__, *kernels]
     return subprocess.Popen(command, stdout=quiet, stderr=quiet)  # noqa: S603 - a module of ours
 
 
@@ -90,7 +90,7 @@ def compile_here(*kernels: str) -> None:
 
 
 def _standing_still() -> RecordingResiduals:
-    """Return what a robot recorded that stands on the paper's course."""
+    """Return a recording of a robot that stands still on the paper's course, with its simulation."""
     rows = 10
     columns = {name: np.zeros(rows) for name in COLUMNS}
     columns["t_s"] += 0.01 * np.arange(rows)

@@ -74,10 +74,10 @@ def _directions(slopes: Array) -> Array:
 
 
 class _Held(NamedTuple):
-    """Residuals of the recordings set aside; what they are under the model found, and that with small changes."""
+    """Residuals of the recordings set aside: under the model found, and with the small changes it asks for."""
 
     residuals: Residuals
-    none: Array
+    before: Array
     noise: Array
 
 
