@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,6 +91,21 @@ def test_a_load_gives_grip_to_a_tyre_that_slides():
     weighed = slippery.with_terms([Term(port="wheel_load", law="n", n=100.0)])
     moved, less = (np.abs(rows(robot) - rows(NOMINAL))[:, 4:6].max() for robot in (slippery, weighed))
     assert less < 0.1 * moved
+
+
+def test_a_wheel_that_lifts_its_axle_as_it_turns_is_held_back_by_its_load():
+    # Straight ahead both wheels have one angle: a radius that follows the other wheel's is the same, and lifts nothing.
+    straight = replayer_of(replace(RECORDING, right_duty=RECORDING.left_duty))
+    radius = NOMINAL.body.wheel_radius
+    lifting = law("rolling_radius", "a * sin(angle)", a=0.05)
+    flat = Term(port="rolling_radius", law="a * sin(other_angle)", a=0.05)
+    held_back = Term(port="motor_torque", law="-a * load * cos(angle)", a=0.05 * radius)
+    plain, alike, other = (
+        straight.play(robot.physics).rows[1:]
+        for robot in (NOMINAL.with_terms([flat]), NOMINAL.with_terms([flat, held_back]), lifting)
+    )
+    assert np.abs(other - alike).max() < 0.01 * np.abs(other - plain).max()
+    assert np.abs(other - plain)[:, 7].max() > 0.1  # rad/s
 
 
 def test_terms_add_up_and_sides_are_told_apart():

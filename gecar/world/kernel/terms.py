@@ -53,6 +53,7 @@ ASKED = np.dtype([(field, np.float64) for field in _ASKED.split()])
 _LARGEST = 1e6
 _LEAST_DIVISOR = 1e-9
 _LARGEST_EXPONENT = 50.0
+_APART = 0.01  # rad, over which a radius's growth with the wheel's angle is measured
 _TIME, _COMMAND, _VOLTAGE, _CURRENT, _ANGLE, _SPEED, _LOAD, _SLIP, _OTHER_ANGLE, _OTHER_SPEED, _OF_SIDE = (
     range(11)
 )
@@ -232,9 +233,27 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
             for hand in range(2):
                 if int(laws.terms[k, SIDE]) in (BOTH, hand):
                     _add_of_wheel(asked, port, hand, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand))
+                    if port == _PORT_RADIUS:
+                        _add_of_wheel(asked, _PORT_TORQUE, hand, _lift(laws, k, v, hand))
         if laws.terms[k, STORE_LENGTH] > 0.0:
             _fill(laws, k, dt, v, stores)
     stores.supply_voltage = asked.supply_voltage
+
+
+@subroutine
+def _lift(laws: Any, k: int, v: Any, hand: int) -> float:
+    """Return the torque on a shaft whose wheel, not round, lifts or lowers its axle as it turns [N m].
+
+    By virtual work, load times what the radius grows by a radian: a term at ``rolling_radius`` gives a share of it.
+    """
+    angle, length = v.of[hand, _ANGLE], int(laws.terms[k, LENGTH])
+    v.of[hand, _ANGLE] = angle + _APART
+    after = _law(laws, k, LAW, length, v, hand)
+    v.of[hand, _ANGLE] = angle - _APART
+    before = _law(laws, k, LAW, length, v, hand)
+    v.of[hand, _ANGLE] = angle
+    radius = laws.wheel_radius * laws.radius_scale
+    return -v.of[hand, _LOAD] * radius * (after - before) / (2.0 * _APART)
 
 
 @kernel
