@@ -338,14 +338,18 @@ def _all_hold(explained: Explanation, held: Residuals) -> bool:
 
 
 def _pruned(written: Written, first: Explanation) -> Written:
-    """Return laws beside those effects alone that still gain enough beside them: others had stood in for a law."""
+    """Return laws beside those effects alone that still gain enough beside them, and are material.
+
+    Others had stood in for a law.
+    """
     problem = written.explained.problem
-    for effect in written.explained.taken.effects:
+    for step in written.explained.steps:
         here = written.explained.taken
-        rest = tuple(e for e in here.effects if e != effect)
+        rest = tuple(e for e in here.effects if e != step.effect)
         start = free(first.problem.estimator.robot, rest).vector(here.values)
         without = _together(first, problem, written.terms, rest, start)
-        if without.cost - here.cost < PRICE:
+        stays = without.cost - here.cost >= PRICE
+        if not (stays and (problem.on_bench or is_material(problem, here, step))):
             written = _written_with(written, first, without, problem)
     return written
 
