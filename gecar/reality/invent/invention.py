@@ -36,7 +36,7 @@ from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import share_asked_for, spread_of_size
-from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
+from gecar.reality.selection.stepwise import Explanation, beside_others, left_by, proved_steps
 from gecar.reality.selection.thresholds import CLOSE, DRIFTING, MOST_EFFECTS, PRICE, SEVERAL
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
@@ -376,7 +376,7 @@ def _explained_with(
     model: Model = problem.estimator.at(bare, parameters.vector(values))
     problem = problem if under else problem.under(model)
     model = problem.estimator.at(model, model.z)
-    left = problem.sizes.left(problem.with_small_changes(model), repeatedly=True)
+    left = left_by(problem, model)
     before = first.problem.sizes.left(first.problem.known.physics, repeatedly=True)
     now, was = (problem.material.times(size) for size in (left, before))
     return replace(
@@ -395,21 +395,22 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     """Return what a law gains on recordings set aside; None where they do not ask for it, or part as far with it.
 
     They must ask for it beside no other change of the robot, or beside those small ones that either asks for: far from
-    what was fitted these may do more harm than good. Whole drives, open loop, are judged as the verdict is.
+    what was fitted these may do more harm than good. Whole drives, open loop, are judged as the verdict is; they must
+    come out much better, unless all of the law is asked for: then something else may send them farther astray.
     """
     if not held.recordings:
         return 0.0
     plain = [held.errors(e.taken.physics) for e in (before, after)]
     beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
-    shares = [(share_asked_for(held.index, *errors).margin, errors) for errors in (plain, beside)]
-    margin, (without, having) = max(shares, key=lambda share: share[0])
+    shares = [(share_asked_for(held.index, *errors), errors) for errors in (plain, beside)]
+    share, (without, having) = max(shares, key=lambda each: each[0].margin)
     gain = cost(without) - cost(having)
-    if gain <= 0.0 or margin <= 0.0:
+    if gain <= 0.0 or share.margin <= 0.0:
         return None
     robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
     whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
     was, now = np.maximum([misfit.gaps for misfit in whole], 0.0).reshape(-1, 2).sum(axis=0)
-    return gain if now < HELPS * was else None
+    return gain if now < (1.0 if share.is_whole else HELPS) * was else None
 
 
 def _of_own_kind(held: Residuals) -> Residuals:

@@ -29,7 +29,6 @@ from gecar.reality.selection.thresholds import MAIN_SHARE, WHOLE_SHARE, WORSE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
-WHOLLY = 0.25  # by which the bounds of a share may differ from 1 where all of an effect is asked for
 APART_S = 1.5  # between two passes of a place
 BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
@@ -197,7 +196,7 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray.
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    if not explained.unexplained or (share.low > 1.0 - WHOLLY and share.high < 1.0 + WHOLLY):
+    if not explained.unexplained or share.is_whole:
         return not worsens(problem, without, explained.taken, sizes)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     now, before = (problem.material.times(sizes.left(physics)) for physics in beside)

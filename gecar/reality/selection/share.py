@@ -32,6 +32,7 @@ Array = npt.NDArray[np.float64]
 AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an effect as without
 LEAST_CHANGE = 1.0  # squared standard deviations: recordings in which an effect does not show
 LEAST_SHOWN = 25.0  # the same: what shows an effect by itself
+WHOLLY = 0.25  # by which the bounds of a share may differ from 1 where all of an effect is asked for
 ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
 
 
@@ -47,6 +48,11 @@ class Share:
     def margin(self) -> float:
         """By how much it passes: surely more than none is asked for, and not surely so little that none is better."""
         return min(self.low, self.high - AS_GOOD_WITHOUT)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether surely all of the effect is asked for, and no more."""
+        return self.low > 1.0 - WHOLLY and self.high < 1.0 + WHOLLY
 
 
 UNSEEN = Share(0.0, -np.inf, np.inf)  # recordings that do not show an effect ask for any share

@@ -153,7 +153,7 @@ def concluded(
             kept = [step for step in steps if step is not weakest]
             drifting = (*drifting, replace(weakest, drifts=True))
         else:
-            left = _left(problem, model)
+            left = left_by(problem, model)
             kept = _standing_beside(problem, model, steps, problem.material.times(left), before)
         if len(kept) == len(steps):
             break
@@ -166,7 +166,7 @@ def concluded(
         problem = problem.under(model, [step.effect for step in named])
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
-        left = _left(problem, model)
+        left = left_by(problem, model)
     much = _is_much(model, problem.material.times(left), before)
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
@@ -194,7 +194,7 @@ def _standing_beside(
     return [step for step in kept if step is not worst]
 
 
-def _left(problem: Problem, model: Model) -> Size:
+def left_by(problem: Problem, model: Model) -> Size:
     """Return what a model leaves, with the most likely small changes of all constants or, if that is less, without.
 
     They explain windows of a second, and may take whole drives farther from what was measured.
