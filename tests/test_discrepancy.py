@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -144,6 +146,21 @@ def test_what_is_left_repeatedly_is_so_in_two_recordings_at_least() -> None:
     assert sizes_of([*still, *spun]).left(narrow, repeatedly=True).deg_1m > 1.0
     assert sizes_of([*still, *spun]).left(narrow).deg_1m < 0.3
     assert sizes_of(spun[:1]).left(narrow, repeatedly=True).deg_1m > 1.0
+
+
+@pytest.mark.parametrize(("even_rows", "left"), [(0, 0.0), (100, 10.0)])
+def test_what_dims_readings_shows_on_even_floor_where_a_line_hides_it(even_rows: int, left: float) -> None:
+    """Beside the edges of a line a path that is known to 3 mm leaves 30 % of a reading uncertain."""
+    noise = 1.5
+    predicted_sd = np.where(np.arange(1000) < even_rows, noise, 30.0)
+    dimmed = SimpleNamespace(
+        recording=SimpleNamespace(reflection_pct=np.full(1000, 80.0 - np.hypot(10.0, noise))),
+        noise=SimpleNamespace(reflection_sd=noise),
+        readings=lambda _: np.full(1000, 80.0),
+        predicted_reading_sd=lambda *_: predicted_sd,
+    )
+    sizes = Sizes((cast("Any", dimmed),), sensor=True)
+    assert sizes.left(EV3.physics).reading_pct == pytest.approx(left)
 
 
 def test_laws_may_leave_what_they_are_off_by() -> None:

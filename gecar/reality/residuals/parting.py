@@ -28,6 +28,8 @@ Rows = npt.NDArray[np.intp]
 PLACE = [X, Y, HEADING]
 METRE = 1.0
 SPOT_M = 0.15  # about a spot on the floor
+EVEN = math.sqrt(2.0)  # times a reading's noise: there the path adds no more than that
+LEAST_ROWS = 50  # of even floor
 APART_M = 0.25  # how far windows of a metre begin from each other
 
 
@@ -181,9 +183,16 @@ def _readings_apart(one: Array, other: Array) -> Size:
 
 
 def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:
-    errors = run.recording.reflection_pct - run.readings(physics)
+    """Return how far readings are off, beyond noise and what the path may be off: in all, or where the floor is even.
+
+    Along a line a path that is known to 3 mm leaves 30 % of a reading uncertain, and hides what light does to it.
+    """
     path_sd = np.hypot(PATH_KNOWN, (1e-3 * off.mm_1m, 1e-3 * off.mm_1m, math.radians(off.deg_1m)))
-    return Size(reading_pct=_root_mean(errors**2 - run.predicted_reading_sd(physics, path_sd) ** 2))
+    predicted_sd = run.predicted_reading_sd(physics, path_sd)
+    beyond = (run.recording.reflection_pct - run.readings(physics)) ** 2 - predicted_sd**2
+    even = beyond[predicted_sd < EVEN * run.noise.reflection_sd]
+    on_even = _root_mean(even) if len(even) >= LEAST_ROWS else 0.0
+    return Size(reading_pct=max(_root_mean(beyond), on_even))
 
 
 def _replayed(run: RecordingResiduals, physics: Physics) -> Prediction:
