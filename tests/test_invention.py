@@ -310,20 +310,28 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, re
     assert written.terms[0].constants["c1"] == pytest.approx(-0.01, rel=0.05)
 
 
-@pytest.mark.parametrize("material", [True, False])
-def test_an_effect_beside_a_law_stays_if_it_is_material_with_its_size_as_fitted_there(monkeypatch, material):
-    monkeypatch.setattr(invention, "is_material", lambda *_: material)
-    rough = robot_with(dict(SCRUB)).with_effects({"viscous_friction": {"coefficient_nms": 1.5e-3}})
+def with_rough_bearings(coefficient_nms):
+    """Return what is discovered where the only effect in the catalogue is beside a moment that scrubs."""
+    rough = robot_with(dict(SCRUB)).with_effects({"viscous_friction": {"coefficient_nms": coefficient_nms}})
     runs = tuple(recorded(rough, seed) for seed in range(5))
     catalogue = [effect for effect in CATALOGUE if effect.id == "viscous_friction"]
-    verdict = discover(Case("both", runs), catalogue=catalogue, language=FEW, invents=True)
+    return discover(Case("both", runs), catalogue=catalogue, language=FEW, invents=True)
+
+
+def test_sizes_told_of_effects_are_those_fitted_beside_the_law():
+    verdict = with_rough_bearings(8e-3)
+    assert [law.term.port for law in verdict.invented] == ["yaw_moment"]
+    told = verdict.effects[0].parameters["coefficient_nms"]
+    assert told.value == pytest.approx(verdict.robot.effects["viscous_friction"]["coefficient_nms"], rel=1e-9)
+    assert told.low < 8e-3 < told.high
+
+
+@pytest.mark.parametrize("material", [True, False])
+def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatch, material):
+    monkeypatch.setattr(invention, "is_material", lambda *_: material)
+    verdict = with_rough_bearings(1.5e-3)
     assert "yaw_moment" in [law.term.port for law in verdict.invented]
     assert [found.id for found in verdict.effects] == ["viscous_friction"] * material
-    for found in verdict.effects:
-        told = found.parameters["coefficient_nms"]
-        carried = verdict.robot.effects["viscous_friction"]["coefficient_nms"]
-        assert told.value == pytest.approx(carried, rel=1e-9)
-        assert told.low < 1.5e-3 < told.high
 
 
 def test_a_language_without_a_law_of_one_part_writes_none():
