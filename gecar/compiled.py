@@ -74,12 +74,12 @@ setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares it
 
 
 def is_cold(what: str = "complete") -> bool:
-    """Whether all that a command needs, or one part of it, has yet to be compiled here."""
+    """Whether compiled code, all of it or a named part, is still missing on this machine."""
     return not (CACHE / what).exists()
 
 
 def mark_warm(what: str = "complete") -> None:
-    """Remember that all that a command needs, or one part of it, has been compiled here."""
+    """Remember that compiled code, all of it or a named part, is there on this machine."""
     with suppress(OSError):
         (CACHE / what).touch()
 

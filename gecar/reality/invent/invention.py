@@ -338,9 +338,9 @@ def _all_hold(explained: Explanation, held: Residuals) -> bool:
 
 
 def _pruned(written: Written, first: Explanation) -> Written:
-    """Return laws beside those effects alone that still gain enough beside them, and are material.
+    """Return laws without the effects that they make needless, which gain too little beside them or do not matter.
 
-    Others had stood in for a law.
+    Such an effect had stood in for a law.
     """
     problem = written.explained.problem
     for step in written.explained.steps:

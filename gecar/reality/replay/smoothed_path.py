@@ -48,7 +48,7 @@ def late_s(replayer: Replayer, physics: npt.NDArray[Any]) -> float:
 
 
 def _smoothed(t: Array, values: Array, at: Array) -> Array:
-    """Return straight lines fitted locally, with normal weights, shape of ``at``; times ``t`` increase.
+    """Return values smoothed by local straight-line fits with normal weights, at times ``at``; times ``t`` increase.
 
     In a gap that is wider than those weights reach, all values count alike.
     """

@@ -1,4 +1,4 @@
-"""The kernels of replays, compiled by several processes at once: each takes 5 to 20 s, once on a machine.
+"""Compiles the replay kernels in several processes at once: each takes 5 to 20 s, once on a machine.
 
 In one process Numba compiles one function at a time; what it made is kept on disk for all others.
 """
@@ -33,7 +33,7 @@ LAW = Term(port="yaw_moment", law="a", a=0.0)  # all laws run in one kernel
 
 @contextmanager
 def compiled_replays(laws: bool, tell: Callable[[str], None]) -> Iterator[None]:
-    """Compile the kernels of replays before a block of code runs, unless that was done on this machine.
+    """Compile the replay kernels before a block of code runs, unless that was done on this machine before.
 
     The kernel for laws, if any are wanted, is compiled while the block runs. One that fails is compiled where it is
     called first.

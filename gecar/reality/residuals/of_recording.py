@@ -179,8 +179,7 @@ class RecordingResiduals:
 
     def predicted_reading_sd(self, physics: Physics, path_sd: Array) -> Array:
         """Return each reading's standard deviation [%], from the sensor's noise and a path's uncertainty (3,)."""
-        middle = self.readings(physics)
-        variance = np.full(len(middle), self.noise.reflection_sd**2)
+        variance = np.full(len(self.replayer.t), self.noise.reflection_sd**2)
         for shift in np.diag(path_sd):
             variance += (0.5 * (self.readings(physics, shift) - self.readings(physics, -shift))) ** 2
         return np.sqrt(variance)

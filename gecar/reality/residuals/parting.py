@@ -183,7 +183,7 @@ def _readings_apart(one: Array, other: Array) -> Size:
 
 
 def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:
-    """Return how far readings are off, beyond noise and what the path may be off: in all, or where the floor is even.
+    """Return the error of readings beyond what noise and an uncertain path explain: overall or on even floor, if more.
 
     Along a line a path that is known to 3 mm leaves 30 % of a reading uncertain, and hides what light does to it.
     """

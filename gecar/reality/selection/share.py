@@ -51,7 +51,7 @@ class Share:
 
     @property
     def is_whole(self) -> bool:
-        """Whether surely all of the effect is asked for, and no more."""
+        """Whether the recordings ask for the whole effect and no more: both bounds are within `WHOLLY` of 1."""
         return self.low > 1.0 - WHOLLY and self.high < 1.0 + WHOLLY
 
 

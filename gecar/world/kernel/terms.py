@@ -242,7 +242,7 @@ def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
 
 @subroutine
 def _lift(laws: Any, k: int, v: Any, hand: int) -> float:
-    """Return the torque on a shaft whose wheel, not round, lifts or lowers its axle as it turns [N m].
+    """Return the torque on a wheel's shaft as the wheel, which is not round, lifts or lowers the axle [N m].
 
     By virtual work, load times what the radius grows by a radian: a term at ``rolling_radius`` gives a share of it.
     """
