@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
+from gecar.reality.fitting.gain_offset import EFFECT as GAIN
+from gecar.reality.fitting.gain_offset import EVEN
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.residuals.regimes import HEADINGS
@@ -27,6 +29,8 @@ Array = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.intp]
 
 THIRDS = 3
+MOMENT_S = 0.25  # in which light that waxes and wanes once a second keeps its strength
+OF_MANY = 0.25  # of an equal part of the information: what one of many groups must have
 BESIDE_CHANGES = 0.05  # relative spread beside the most likely small changes
 REGIMES = (("slow", "fast"), ("straight", "turning"), ("backward",), ("change of command",))
 """Each splits the residuals into those of its regimes, and the others."""
@@ -65,7 +69,7 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni
-    return all(
+    return _flickers(problem, step) or all(
         any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
         for errors, least in ((unknown, DRIFTING), (known, BESIDE_CHANGES))
     )
@@ -100,7 +104,7 @@ def heterogeneity(groups: Groups, without: Array, with_effect: Array) -> Heterog
         Whitened residuals of the two models, shape (n,).
     """
     shares, information = shares_of_groups(groups, without, with_effect)
-    shown = information > NEGLIGIBLE * information.sum()
+    shown = information > min(NEGLIGIBLE, OF_MANY / max(len(shares), 1)) * information.sum()
     shares, information = shares[shown], information[shown]
     if len(shares) < 2:
         return Heterogeneity(0.0, 1.0)
@@ -119,3 +123,19 @@ def _splits(problem: Problem, model: Model) -> Iterator[Groups]:
     # Light from one side makes readings depend on the heading, and looks like a gain.
     for names in (*REGIMES, HEADINGS) if problem.residuals.sensor else REGIMES:
         yield np.select([masks[name] for name in names], range(1, len(names) + 1)).astype(np.intp)
+
+
+def _flickers(problem: Problem, step: Step) -> bool:
+    """Whether a gain differs from moment to moment on even floor: light that waxes and wanes is one on the mean.
+
+    In units of the sensor's noise, as what a flicker leaves would count as noise otherwise.
+    """
+    if step.effect != GAIN:
+        return False
+    index, residuals = problem.residuals.index, problem.residuals
+    moment = (index.t_s / MOMENT_S).astype(np.intp)
+    moments = index.recording.astype(np.intp) * (int(moment.max(initial=0)) + 1) + moment
+    even = residuals.reading_sd <= EVEN * residuals.recordings[0].noise.reflection_sd
+    without, with_effect = (residuals.errors(model.physics) for model in (step.base, step.model))
+    found = heterogeneity(moments[even], without[even], with_effect[even])
+    return _differs(found, DRIFTING, SIGNIFICANCE)
