@@ -12,7 +12,7 @@ import numpy as np
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.parameters import free
-from gecar.reality.materiality import DEFAULT, Size
+from gecar.reality.materiality import DEFAULT, Material, Size
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.selection.problem import Problem
@@ -102,6 +102,9 @@ class LinearSizes:
     def apart(self, one: np.ndarray, other: np.ndarray) -> Size:
         change = self.residuals.errors(one) - self.residuals.errors(other)
         return Size(mm_1m=10.0 * float(np.sqrt(np.mean(change**2))))
+
+    def are_apart(self, one: np.ndarray, other: np.ndarray, material: Material) -> bool:
+        return material.times(self.apart(one, other)) >= 1.0
 
     def left(self, physics: np.ndarray, repeatedly: bool = False) -> Size:
         beyond = np.mean(self.residuals.errors(physics) ** 2) - 1.0

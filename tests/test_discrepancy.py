@@ -148,6 +148,16 @@ def test_what_is_left_repeatedly_is_so_in_two_recordings_at_least() -> None:
     assert sizes_of(spun[:1]).left(narrow, repeatedly=True).deg_1m > 1.0
 
 
+def test_robots_are_apart_if_any_recording_parts_them_by_a_material_size() -> None:
+    narrow = EV3.with_effects({"track_width": {"scale": 0.97}}).physics
+    sizes = sizes_of([recorded(EV3, 0, most=0), recorded(EV3, 1)])
+    line = sizes.apart(EV3.physics, narrow).deg_1m * 5.0  # mm: a degree is a fifth of it
+    for share in (0.9, 1.1):
+        material = Material(share * line)
+        assert sizes.are_apart(EV3.physics, narrow, material) is (share < 1.0)
+        assert (material.times(sizes.apart(EV3.physics, narrow)) >= 1.0) is (share < 1.0)
+
+
 @pytest.mark.parametrize(("even_rows", "left"), [(0, 0.0), (100, 10.0)])
 def test_what_dims_readings_shows_on_even_floor_where_a_line_hides_it(even_rows: int, left: float) -> None:
     """Beside the edges of a line a path that is known to 3 mm leaves 30 % of a reading uncertain."""

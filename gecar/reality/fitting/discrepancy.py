@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.replay.channels import CHANNELS
 
 Array = npt.NDArray[np.float64]
+Method = Literal["trf", "bvls"]
 Single = npt.NDArray[np.float32]
 
 ROUNDS = 3  # of weights and ratios, each from what the others leave
@@ -100,12 +102,15 @@ class Discrepancy:
         into = basis * self.root_weight[:, None]
         return into.astype(np.float32), np.ascontiguousarray(shrunk.T, np.float32)
 
-    def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
-        """Return the most likely small changes within bounds, in the catalogue's sizes, shape (changes,)."""
+    def small_changes(self, errors: Array, low: Array, high: Array, method: Method = "trf") -> Array:
+        """Return the most likely small changes within bounds, in the catalogue's sizes, shape (changes,).
+
+        By a method of `scipy.optimize.lsq_linear`: both end within 1e-4 of a size, "bvls" five times as fast.
+        """
         inside = (errors * self.scale * self.root_weight) @ self.basis
         rows = np.vstack([self.spread[:, None] * self.back, np.eye(self.back.shape[1])])
         asked = -np.r_[inside, np.zeros(self.back.shape[1])]
-        found: Array = self.small * lsq_linear(rows, asked, (low / self.small, high / self.small)).x
+        found: Array = self.small * lsq_linear(rows, asked, (low / self.small, high / self.small), method).x
         return found
 
 

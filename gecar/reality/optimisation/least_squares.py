@@ -144,10 +144,10 @@ def least_squares(
                 break
             damping *= 6.0
         if before - now < max(close * 1e-2 * before, 0.02):
-            found = (
-                _past_a_jump(residual, z, normal, gradient, bounds) if past_jumps and damping > STUCK else z
-            )
-            tried = residual(found)
+            found, tried = z, errors
+            if past_jumps and damping > STUCK:
+                found = _past_a_jump(residual, z, normal, gradient, bounds)
+                tried = residual(found)
             if cost(tried) > (1.0 - WORTH_A_JUMP) * before:
                 break
             z, errors, now, damping = found, tried, cost(tried), LIGHT

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from gecar.reality.materiality import Size, combined
+from gecar.reality.materiality import Material, Size, combined
 from gecar.reality.noise.sensor_noise import PATH_CAUTION
 from gecar.reality.recordings.dead_reckoning import wheel_odometry
 from gecar.reality.replay.kernel import HEADING, X, Y
@@ -88,16 +88,21 @@ class Sizes:
 
     def apart_of_each(self, one: Physics, others: Sequence[Physics]) -> list[Size]:
         """Return how far one robot parts from each of several others, as `apart` does from one."""
+        return [combined([*self._apart_in_each(one, other)]) for other in others]
+
+    def are_apart(self, one: Physics, other: Physics, material: Material) -> bool:
+        """Whether two robots part by a size that is material, in any recording; physics records of shape (1,)."""
+        return any(material.times(size) >= 1.0 for size in self._apart_in_each(one, other))
+
+    def _apart_in_each(self, one: Physics, other: Physics) -> Iterator[Size]:
+        """Yield how far two robots part in each recording."""
         runs, key = (*self.runs, *self.beside), one.tobytes()
         if key not in self.last:
             self.last.clear()
             self.last[key] = [self._did(run, one) for run in runs]
         apart = _readings_apart if self.sensor else _drives_apart
-        mine = self.last[key]
-        return [
-            combined([apart(own, self._did(run, other)) for run, own in zip(runs, mine, strict=True)])
-            for other in others
-        ]
+        for run, mine in zip(runs, self.last[key], strict=True):
+            yield apart(mine, self._did(run, other))
 
     def _did(self, run: RecordingResiduals, physics: Physics) -> Any:
         """Return what a robot did under a recording's commands: what its sensor read, or how it drove."""

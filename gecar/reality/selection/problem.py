@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
-from gecar.reality.fitting.discrepancy import Discrepancy, discrepancy
+from gecar.reality.fitting.discrepancy import Discrepancy, Method, discrepancy
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import ripple_responses
 from gecar.reality.fitting.model import Model
@@ -193,13 +193,15 @@ class Problem:
         if left is None:
             return model.physics
         parameters, z, at = self._with_others(model)
-        z[at] += self._linear_changes(left, errors, *self._room(parameters, z, at))
+        z[at] += self._linear_changes(left, errors, *self._room(parameters, z, at), method="bvls")
         return parameters.physics(np.clip(z, *parameters.bounds))
 
-    def _linear_changes(self, left: Discrepancy, errors: Array, low: Array, high: Array) -> Array:
+    def _linear_changes(
+        self, left: Discrepancy, errors: Array, low: Array, high: Array, method: Method = "trf"
+    ) -> Array:
         """Return the most likely small changes by derivatives, within bounds, shape (changes,)."""
         others = np.full(len(left.small) - len(low), 1.0)  # of instruments and ripples
-        return left.small_changes(errors, np.r_[low, -others], np.r_[high, others])[: len(low)]
+        return left.small_changes(errors, np.r_[low, -others], np.r_[high, others], method)[: len(low)]
 
     def small_changes(self, model: Model, beside: Model | None = None) -> dict[str, dict[str, float]]:
         """Return a model's values with the most likely small changes of all other parameters, by effect and label."""

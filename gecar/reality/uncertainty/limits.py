@@ -200,8 +200,7 @@ class _Search:
         problem, parameters = self._problem, self._parameters
         if not worthwhile(parameters, z, self._effect, problem.share):
             return False
-        size = problem.sizes.apart(self._model.physics, parameters.physics(z))
-        return problem.material.times(size) >= 1.0
+        return problem.sizes.are_apart(self._model.physics, parameters.physics(z), problem.material)
 
 
 def _between(sizes: Array, before: float, now: float) -> float:
