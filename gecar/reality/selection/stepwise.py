@@ -113,21 +113,19 @@ def _explain_motor(problem: Problem, first: Sequence[Step]) -> Explanation:
 
     What takes another's place may let more come forward: then the chain goes on.
     """
-    model = with_constants(problem, problem.known)
-    chain = _Chain(_steps(problem, model), model, (tuple(first),))
+    chain = _Chain((), with_constants(problem, problem.known), (tuple(first),))
     for _ in range(CONTINUED):
         chain = _forward(problem, chain, candidate_steps(problem, chain.model))
         model = with_constants(problem, chain.model)
         constants = [effect for effect in model.effects if effect in CONSTANTS]
         found = replace(chain, steps=tuple(s for s in chain.steps if s.effect not in CONSTANTS), model=model)
         model, kept = _swapped_and_dropped(problem, found, chain.tried, constants)
-        model = with_constants(problem, model)
-        stages = {step.effect: step.stage for step in kept}
-        steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, model)]
-        chain = replace(chain, steps=tuple(steps), model=model)
+        chain = replace(chain, steps=kept, model=with_constants(problem, model))
         if _effects(found.steps) == _effects(kept):
             break
-    return concluded(problem, model, chain.steps, chain.tried)
+    stages = {step.effect: step.stage for step in chain.steps}
+    steps = [replace(step, stage=stages.get(step.effect, 0)) for step in _steps(problem, chain.model)]
+    return concluded(problem, chain.model, steps, chain.tried)
 
 
 def _steps(problem: Problem, model: Model) -> tuple[Step, ...]:
@@ -266,7 +264,7 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Cha
         steps.append(replace(step, stage=len(tried) - 1))
         if other is not None and _effects(steps) == _effects(other.steps[: len(steps)]):
             return other
-        if len(steps) == most:
+        if len(step.model.effects) == most:
             model = step.model
             break
         here = problem.under(step.model)
