@@ -26,7 +26,7 @@ evolve: $(VENV)/.runtime  ## Evolve a program on the paper's course; results and
 	$(PY) -m gecar evolve --out "$$(printf 'runs/evolve-%03d' $$n)" $(ARGS)
 
 test: $(VENV)/.test $(VENV)/.node  ## Run the tests
-	$(PY) -m pytest -n auto $(ARGS)
+	$(PY) -m pytest -n auto --dist worksteal $(ARGS)
 
 check: $(VENV)/.check  ## Check format, style, types and which room imports which
 	$(VENV)/bin/ruff format --check
