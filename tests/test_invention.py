@@ -282,19 +282,27 @@ def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, beside
     assert [law.term.port for law in verdict.invented] == ["command"]
 
 
-@pytest.mark.parametrize("refused", [False, True], ids=["after the law", "before it"])
-def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, refused):
-    """After the law, which hides it till then; or taken back where no law holds without it."""
+@pytest.mark.parametrize("before", ["nothing", "refused", "another"])
+def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, before):
+    """After the law, which hides it till then, before a second one; or taken back where no law holds without it.
+
+    An effect that was named for it makes room.
+    """
     robot = robot_with(dict(SCRUB)).with_effects({"battery_resistance": {"resistance_ohm": 0.3}})
     runs = [recorded(robot, seed) for seed in range(6)]
     noise = estimate_noise(runs, EV3.physics, 1.0)
     fitted, held = (motion_residuals(some, noise, 1.0, Threads(1)) for some in (runs[:4], runs[4:]))
-    catalogue = [*UNRELATED, BY_ID["battery_resistance"]]
+    catalogue = [*UNRELATED, BY_ID["battery_resistance"], BY_ID["viscous_friction"]]
     problem = problem_of(fitted, EV3, observable(catalogue, fitted), held=held)
     tried = explain(problem).tried
-    nothing = concluded(problem, problem.known, (), tried)
+    explained = concluded(problem, problem.known, (), tried)
     again = ()
-    if refused:
+    if before == "another":
+        other = next(step for step in tried[0] if step.effect == "viscous_friction")
+        problem = problem.under(other.model)
+        taken = problem.estimator.at(other.model, other.model.z)
+        explained = replace(explained, problem=problem, taken=taken, steps=(other,))
+    if before == "refused":
         again = [step for step in tried[0] if step.effect == "battery_resistance"]
         first_that_holds = invention._first_that_holds
 
@@ -302,9 +310,11 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, re
             return first_that_holds(written, first, library, *others) if library.model.effects else None
 
         monkeypatch.setattr(invention, "_first_that_holds", beside_effects_alone)
-    written = invention.invent(nothing, held, FEW, refused=again)
+    written = invention.invent(explained, held, FEW, refused=again)
     assert [term.port for term in written.terms] == ["yaw_moment"]
-    assert [step.effect for step in written.explained.steps] == ["battery_resistance"]
+    (step,) = written.explained.steps
+    assert step.effect == "battery_resistance"
+    assert step.holdout_gain > 0.0
     values = written.explained.taken.values["battery_resistance"]
     assert values["resistance_ohm"] == pytest.approx(0.3, rel=0.05)
     assert written.terms[0].constants["c1"] == pytest.approx(-0.01, rel=0.05)

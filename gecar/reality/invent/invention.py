@@ -106,6 +106,8 @@ def invent(
 ) -> Written:
     """Write laws for what an explanation leaves, one after the other, as long as each proves itself.
 
+    After each, effects are chosen anew beside the laws: a listed cause goes before a further law.
+
     Parameters
     ----------
     explained
@@ -143,13 +145,13 @@ def invent(
         written = replace(more, invented=(*written.invented, *told))
         tell(f"a law: {', '.join(f'{term.port} = {term.law}' for term in law.terms)}")
         # In mm of an EV3's wheel little of another motor is material: on a bench a law must prove itself, and no more.
-        if not (written.explained.unexplained or problem.on_bench):
-            break
-    if not written.terms:
-        return written
-    if not problem.on_bench:
+        if problem.on_bench:
+            continue
         written = _with_effects(written, first, held, {step.effect for step in refused})
-    return replace(written, invented=_with_constants_of(written, first))
+        first = replace(first, steps=written.explained.steps)
+        if not written.explained.unexplained:
+            break
+    return replace(written, invented=_with_constants_of(written, first)) if written.terms else written
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -256,19 +258,39 @@ def _written_with(
 
 
 def _with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
-    """Add effects that stand out only beside the laws, one by one, as long as all hold with the laws fitted anew.
+    """Choose effects anew beside the laws, one by one, as long as all hold with the laws fitted anew.
 
-    Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings. Robots
-    with laws are not replayed in lock step: those effects alone are tried that gained something without a law.
+    Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
+    another may have stood in for it. Robots with laws are not replayed in lock step: those effects alone are tried that
+    gained something without a law.
     """
     gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
     left_out = frozenset(first.problem.catalogue) - gained - refused
+    for step in written.explained.steps:
+        without = _without(written, first, step)
+        swapped = _with_one_more(without, first, held, left_out)
+        if swapped and step.effect not in swapped.explained.taken.effects:
+            written = swapped
     while len(written.explained.taken.effects) < MOST_EFFECTS:
         more = _with_one_more(written, first, held, left_out)
         if more is None:
             break
         written = more
     return written
+
+
+def _without(written: Written, first: Explanation, step: Step) -> Written:
+    """Return laws without one of the effects beside them, the others fitted anew."""
+    fitted = _fitted_without(written, first, step)
+    return _written_with(written, replace(first, steps=written.explained.steps), fitted)
+
+
+def _fitted_without(written: Written, first: Explanation, step: Step) -> _Together:
+    """Fit laws and effects without one of these, beginning with what they are, under the same discrepancy."""
+    here = written.explained
+    rest = [effect for effect in here.taken.effects if effect != step.effect]
+    start = free(first.problem.estimator.robot, rest).vector(here.taken.values)
+    return _together(first, here.problem, written.terms, rest, start)
 
 
 def _with_one_more(
@@ -284,8 +306,9 @@ def _with_one_more(
         start = free(first.problem.estimator.robot, effects).vector(step.model.values)
         fitted = _together(first, problem.under(step.model), written.terms, effects, start)
         more = _written_with(written, replace(first, steps=steps, tried=tried), fitted)
-        if _all_hold(more.explained, held):
-            return more
+        explained = _held_up(more.explained, held)
+        if explained:
+            return replace(more, explained=explained)
     return None
 
 
@@ -307,8 +330,9 @@ def _first_beside(
         tried.append((cost_of_all + PRICE * len(some), first, library, laws))
     for _, first, library, laws in sorted(tried, key=lambda each: each[0]):
         holds = _first_that_holds(Written(first, (), ()), first, library, laws, held, nulls)
-        if holds and _all_hold(holds.written.explained, held):
-            return holds
+        held_up = _held_up(holds.written.explained, held) if holds else None
+        if holds and held_up:
+            return holds._replace(written=replace(holds.written, explained=held_up))
     return None
 
 
@@ -322,19 +346,21 @@ def _taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
     return replace(explained, problem=problem, taken=model, whole=model, steps=steps)
 
 
-def _all_hold(explained: Explanation, held: Residuals) -> bool:
-    """Whether all effects beside laws are material, of one size, and asked for by the recordings set aside.
+def _held_up(explained: Explanation, held: Residuals) -> Explanation | None:
+    """Return an explanation all of whose effects hold beside laws, with their hold-out gains; None if any does not.
 
-    Where much is left they must stand out of it, as effects without laws must.
+    Each must be material, of one size, and asked for by the recordings set aside. Where much is left they must stand
+    out of it, as effects without laws must.
     """
     problem, model = explained.problem, explained.taken
     for step in explained.steps:
         alone = beside_others(problem, model, step)
         if not is_material(problem, model, alone) or drifts(problem, model, alone):
-            return False
+            return None
         if explained.unexplained and not stands_out(problem, alone):
-            return False
-    return len(confirmed(explained, held).explained.steps) == len(explained.steps)
+            return None
+    steps = confirmed(explained, held).explained.steps
+    return replace(explained, steps=steps) if len(steps) == len(explained.steps) else None
 
 
 def _pruned(written: Written, first: Explanation) -> Written:
@@ -344,10 +370,7 @@ def _pruned(written: Written, first: Explanation) -> Written:
     """
     problem = written.explained.problem
     for step in written.explained.steps:
-        here = written.explained.taken
-        rest = tuple(e for e in here.effects if e != step.effect)
-        start = free(first.problem.estimator.robot, rest).vector(here.values)
-        without = _together(first, problem, written.terms, rest, start)
+        without, here = _fitted_without(written, first, step), written.explained.taken
         stays = without.cost - here.cost >= PRICE
         if not (stays and (problem.on_bench or is_material(problem, here, step))):
             written = _written_with(written, first, without, problem)
