@@ -4,6 +4,8 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check
+# Python compiles a module when it is first imported: to compile all that libraries bring takes as long as to install them.
+INSTALL := $(PIP) install --quiet --no-compile --editable
 ARGS ?=
 
 # The first Python here that is new enough; set it yourself with: make env PYTHON=/path/to/python3.12
@@ -63,12 +65,12 @@ $(PY):
 
 $(VENV)/.runtime: pyproject.toml | $(PY)
 	@echo "Installing gecar and its libraries into .venv (once) ..."
-	@$(PIP) install --quiet --editable .
+	@$(INSTALL) .
 	@touch $@
 
 $(VENV)/.test $(VENV)/.check $(VENV)/.docs $(VENV)/.cluster $(VENV)/.fuzz: $(VENV)/.%: pyproject.toml $(VENV)/.runtime
 	@echo "Installing what 'make $*' needs into .venv (once) ..."
-	@$(PIP) install --quiet --editable '.[$*]'
+	@$(INSTALL) '.[$*]'
 	@touch $@
 
 # MicroPython for the tests of exported programs. Without npm or a network those tests are skipped, and say so.
