@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from concealing import EV3, recorded
+from test_location import seen_on_the_course
 
 from gecar.cli.actions.discover import draw
 from gecar.errors import InputError
@@ -342,6 +343,17 @@ def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatc
     verdict = with_rough_bearings(1.5e-3)
     assert "yaw_moment" in [law.term.port for law in verdict.invented]
     assert [found.id for found in verdict.effects] == ["viscous_friction"] * material
+
+
+@pytest.mark.parametrize("waxing", [0.0, 0.1], ids=["darker", "flickers"])
+def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
+    language, runs = parse_grammar("<t> ::= colour_reading: c * 1 | yaw_moment: c * 1"), []
+    for seed in range(4):
+        run = seen_on_the_course(seed, EV3)
+        light = 0.88 + waxing * np.sin(2.0 * np.pi * 1.1 * run.t_s + seed)
+        runs.append(replace(run, reflection_pct=np.round(run.reflection_pct * light)))
+    verdict = discover(Case("lamp", tuple(runs)), catalogue=UNRELATED, language=language, invents=True)
+    assert [law.term.port for law in verdict.invented] == ["colour_reading"] * (not waxing)
 
 
 def test_a_language_without_a_law_of_one_part_writes_none():

@@ -32,7 +32,7 @@ from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import is_material, stands_out
-from gecar.reality.selection.homogeneity import drifts
+from gecar.reality.selection.homogeneity import drifts, flickers
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import share_asked_for, spread_of_size
@@ -209,10 +209,20 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _spread(library, law) < DRIFTING:
+        if law.worth >= PRICE and proof.holds and _has_one_size(library, law):
             yield law, proof
         if len(tried) == TRIED:
             return
+
+
+def _has_one_size(library: Library, law: Law) -> bool:
+    """Whether a law has one size in all recordings, and at all moments if it is of readings, as effects must."""
+    if _spread(library, law) >= DRIFTING:
+        return False
+    if any(term.port != "colour_reading" for term in law.terms):
+        return True
+    physics = law.parameters.physics(law.minimum.z)
+    return not flickers(library.problem.residuals, library.model.physics, physics)
 
 
 def _spread(library: Library, law: Law) -> float:

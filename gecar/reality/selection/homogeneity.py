@@ -20,6 +20,7 @@ from gecar.reality.fitting.gain_offset import EFFECT as GAIN
 from gecar.reality.fitting.gain_offset import EVEN
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
+from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.regimes import HEADINGS
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import shares_of_groups
@@ -69,7 +70,8 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni
-    return _flickers(problem, step) or all(
+    is_gain = step.effect == GAIN
+    return (is_gain and flickers(problem.residuals, step.base.physics, step.model.physics)) or all(
         any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
         for errors, least in ((unknown, DRIFTING), (known, BESIDE_CHANGES))
     )
@@ -125,17 +127,21 @@ def _splits(problem: Problem, model: Model) -> Iterator[Groups]:
         yield np.select([masks[name] for name in names], range(1, len(names) + 1)).astype(np.intp)
 
 
-def _flickers(problem: Problem, step: Step) -> bool:
+def flickers(residuals: Residuals, without: Physics, with_it: Physics) -> bool:
     """Whether a gain differs from moment to moment on even floor: light that waxes and wanes is one on the mean.
 
     In units of the sensor's noise, as what a flicker leaves would count as noise otherwise.
+
+    Parameters
+    ----------
+    residuals
+        Of the colour sensor.
+    without, with_it
+        Physics records without what changes readings and with it, shape (1,).
     """
-    if step.effect != GAIN:
-        return False
-    index, residuals = problem.residuals.index, problem.residuals
+    index = residuals.index
     moment = (index.t_s / MOMENT_S).astype(np.intp)
     moments = index.recording.astype(np.intp) * (int(moment.max(initial=0)) + 1) + moment
     even = residuals.reading_sd <= EVEN * residuals.recordings[0].noise.reflection_sd
-    without, with_effect = (residuals.errors(model.physics) for model in (step.base, step.model))
-    found = heterogeneity(moments[even], without[even], with_effect[even])
-    return _differs(found, DRIFTING, SIGNIFICANCE)
+    before, after = (residuals.errors(physics)[even] for physics in (without, with_it))
+    return _differs(heterogeneity(moments[even], before, after), DRIFTING, SIGNIFICANCE)
