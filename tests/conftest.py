@@ -18,6 +18,19 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     threads.CORES = 1
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--slow``."""
+    parser.addoption("--slow", action="store_true", help="run the tests marked slow, too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip the tests marked slow, unless they are asked for: without them the suite takes less than 15 minutes."""
+    if not config.getoption("--slow"):
+        for item in items:
+            if item.get_closest_marker("slow"):
+                item.add_marker(pytest.mark.skip(reason='takes minutes: make test ARGS="--slow"'))
+
+
 def pytest_xdist_setupnodes() -> None:
     """Compile what takes longest before there are workers: else each of them compiles all of it at the same time."""
     if is_cold(compilation.REPLAYS):

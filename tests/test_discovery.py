@@ -215,6 +215,7 @@ needs_practice = pytest.mark.skipif(
 
 
 @needs_practice
+@pytest.mark.slow
 def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
     case = read_case(SHARED / "practice" / "p08")
     verdict = discover(replace(case, recordings=case.recordings[:4]))  # in a fifth of the time of all
@@ -228,6 +229,7 @@ def test_a_floor_that_leans_in_a_3d_world_is_found() -> None:
 @pytest.mark.skipif(
     not (SHARED / "real").is_dir(), reason="the real recordings (../shared/recordings) are not here"
 )
+@pytest.mark.slow
 def test_a_real_motor_is_predicted_within_a_hundredth() -> None:
     held = ["step_+040", "step_-020", "step_-100"]
     case = read_case(SHARED / "real" / "ev3_motor_a")

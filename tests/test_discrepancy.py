@@ -220,6 +220,7 @@ def test_an_effect_of_the_size_of_its_limit_is_found(nothing, effect: str, label
     assert [found.id for found in verdict.effects] == [effect]
 
 
+@pytest.mark.slow
 def test_patches_of_the_size_of_their_limit_are_found_at_most_places_that_were_passed(nothing) -> None:
     size, found = nothing.limits["slippery_patch"].size, 0
     fitted = [recorded(EV3, int(name.removeprefix("run_"))) for name in nothing.fitted_on]

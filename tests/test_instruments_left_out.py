@@ -39,10 +39,11 @@ def knocked(robot: Robot, seed: int) -> Recording:
 @pytest.mark.parametrize(
     ("damaged", "instrument", "effect", "label", "value", "within"),
     [
-        (jumping, "encoders", "track_width", "scale", 0.93, 0.003),
-        (knocked, "poses", "viscous_friction", "coefficient_nms", 0.002, 2e-4),
+        pytest.param(
+            jumping, "encoders", "track_width", "scale", 0.93, 0.003, marks=pytest.mark.slow, id="encoders"
+        ),
+        pytest.param(knocked, "poses", "viscous_friction", "coefficient_nms", 0.002, 2e-4, id="poses"),
     ],
-    ids=["encoders", "poses"],
 )
 def test_an_effect_is_found_beside_an_instrument_that_errs_and_this_stays_unexplained(
     damaged: Callable[[Robot, int], Recording],

@@ -104,6 +104,7 @@ def test_without_a_camera_nothing_concealed_is_nothing_found() -> None:
     assert any("began" in note for note in verdict.notes)
 
 
+@pytest.mark.slow
 def test_without_a_camera_a_sensor_mounted_elsewhere_is_found() -> None:
     verdict = discover(blind(EV3.with_effects({"sensor_position": {"left_m": 0.012}}), 3))
     assert [f.id for f in verdict.effects] == ["sensor_position"]
