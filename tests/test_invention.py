@@ -25,8 +25,7 @@ from gecar.plots.style import is_whole
 from gecar.reality import discovery
 from gecar.reality.compare.choices import Told
 from gecar.reality.discovery import discover
-from gecar.reality.invent import invention
-from gecar.reality.invent.invention import Written
+from gecar.reality.invent import beside, invention
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import left_out_gains, simplified
 from gecar.reality.invent.search import Library, fit
@@ -40,6 +39,7 @@ from gecar.reality.invent.sentences import (
     read_sentence,
     single_laws,
 )
+from gecar.reality.invent.written import Written
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, read_case
 from gecar.reality.residuals.of_case import motion_residuals
@@ -262,10 +262,10 @@ def test_commands_that_act_late_are_written_as_such():
     assert law.parameters["store_s"].value == pytest.approx(0.07, rel=0.05)
 
 
-@pytest.mark.parametrize("beside", [True, False], ids=["beside", "instead"])
-def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, beside):
+@pytest.mark.parametrize("without", [False, True], ids=["beside", "instead"])
+def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, without):
     """The effect goes where the law is found beside it, and where it is found without the effect alone."""
-    if not beside:
+    if without:
         hidden_by_effects = discovery.invent
 
         def invent(explained, *args):
@@ -339,7 +339,7 @@ def test_sizes_told_of_effects_are_those_fitted_beside_the_law():
 
 @pytest.mark.parametrize("material", [True, False])
 def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatch, material):
-    monkeypatch.setattr(invention, "is_material", lambda *_: material)
+    monkeypatch.setattr(beside, "is_material", lambda *_: material)
     verdict = with_rough_bearings(1.5e-3)
     assert "yaw_moment" in [law.term.port for law in verdict.invented]
     assert [found.id for found in verdict.effects] == ["viscous_friction"] * material

@@ -11,68 +11,40 @@ Then the same again, on top of it, for what is still left. The law becomes a par
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.language.grammar import Grammar
-from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.model import Effects, Model, Step
-from gecar.reality.fitting.parameters import free
-from gecar.reality.invent.free_terms import FARTHEST, FreeTerms
-from gecar.reality.invent.looks import looks_like
+from gecar.reality.fitting.model import Step
+from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key
 from gecar.reality.invent.states import ranges
-from gecar.reality.optimisation.least_squares import cost, jacobian, least_squares
-from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.invent.written import Written, added, with_constants_of
+from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.acceptance import is_material, stands_out
-from gecar.reality.selection.homogeneity import drifts, flickers
+from gecar.reality.selection.homogeneity import flickers
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import share_asked_for, spread_of_size
-from gecar.reality.selection.stepwise import Explanation, beside_others, left_by, proved_steps
-from gecar.reality.selection.thresholds import CLOSE, DRIFTING, MOST_EFFECTS, PRICE, SEVERAL
-from gecar.reality.uncertainty.intervals import half_widths_of
-from gecar.reality.verdict import Interval, Invented
+from gecar.reality.selection.stepwise import Explanation
+from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE
+from gecar.reality.verdict import Invented
 from gecar.world.ports import AT_A_POINT, N_TERMS, PORTS
-from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
 
 MOST_LAWS = 3
 TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
-LAWS_LEAVE = 0.15  # share of the error without any: a law has not the cause's own form
-ROUNDS = 6
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
 OF_PAIR = frozenset(("side", "other_angle", "other_speed"))  # and that one motor alone has not
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
-
-
-@dataclass(frozen=True)
-class Written:
-    """Laws written on top of an explanation.
-
-    Attributes
-    ----------
-    explained
-        The explanation with the robot that has them, and what is left then.
-    terms
-        The laws, their constants fitted together.
-    invented
-        What the verdict says of each.
-    """
-
-    explained: Explanation
-    terms: tuple[Term, ...]
-    invented: tuple[Invented, ...]
 
 
 class _Proven(NamedTuple):
@@ -147,11 +119,11 @@ def invent(
         # In mm of an EV3's wheel little of another motor is material: on a bench a law must prove itself, and no more.
         if problem.on_bench:
             continue
-        written = _with_effects(written, first, held, {step.effect for step in refused})
+        written = with_effects(written, first, held, {step.effect for step in refused})
         first = replace(first, steps=written.explained.steps)
         if not written.explained.unexplained:
             break
-    return replace(written, invented=_with_constants_of(written, first)) if written.terms else written
+    return replace(written, invented=with_constants_of(written, first)) if written.terms else written
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -192,7 +164,7 @@ def _first_that_holds(
 ) -> _Proven | None:
     """Add the best law that is proved and that the held-out recordings confirm; None if there is none."""
     for law, proof in _proved(library, found, nulls):
-        more = _pruned(_added(written, first, library, law), first)
+        more = pruned(added(written, first, library, law), first)
         gain = _gain_set_aside(written.explained, more.explained, held)
         if gain is not None:
             told = _told(library, law, _indistinguishable(law, found), proof, gain)
@@ -230,98 +202,6 @@ def _spread(library: Library, law: Law) -> float:
     return spread_of_size(library.problem.estimator.blocks.folds, library.model.errors, law.minimum.errors)
 
 
-def _added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
-    """Return laws with one more, all constants fitted together anew, and what is left then."""
-    effects = library.model.effects
-    parameters = free(first.problem.estimator.robot, effects)
-    terms, start = (*written.terms, *law.terms), law.minimum.z[: parameters.size]
-    return _written_with(written, first, _together(first, library.problem, terms, effects, start))
-
-
-class _Together(NamedTuple):
-    """Laws and effects whose constants were fitted together: both, the effects' values, and what they cost."""
-
-    terms: tuple[Term, ...]
-    effects: tuple[str, ...]
-    values: Effects
-    cost: float
-
-
-def _together(
-    first: Explanation, under: Problem, terms: tuple[Term, ...], effects: Sequence[str], start: Array
-) -> _Together:
-    """Fit all constants of laws and effects; these begin at the vector ``start``, under a problem's discrepancy."""
-    parameters = free(first.problem.estimator.robot, effects)
-    together = FreeTerms(parameters, start, terms)
-    residual = under.estimator.residual(together)
-    found = least_squares(residual, together.z, together.bounds, together.probes, ROUNDS)
-    values = parameters.values(found.z[: parameters.size])
-    return _Together(together.fitted(found.z), tuple(effects), values, found.cost)
-
-
-def _written_with(
-    written: Written, first: Explanation, fitted: _Together, under: Problem | None = None
-) -> Written:
-    """Return laws as they were fitted together with effects, and what is left then; ``under`` as `_explained_with`."""
-    explained = _explained_with(first, fitted.terms, fitted.effects, fitted.values, under)
-    return replace(written, explained=explained, terms=fitted.terms)
-
-
-def _with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
-    """Choose effects anew beside the laws, one by one, as long as all hold with the laws fitted anew.
-
-    Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
-    another may have stood in for it. Robots with laws are not replayed in lock step: those effects alone are tried that
-    gained something without a law.
-    """
-    gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
-    left_out = frozenset(first.problem.catalogue) - gained - refused
-    for step in written.explained.steps:
-        without = _without(written, first, step)
-        swapped = _with_one_more(without, first, held, left_out)
-        if swapped and step.effect not in swapped.explained.taken.effects:
-            written = swapped
-    while len(written.explained.taken.effects) < MOST_EFFECTS:
-        more = _with_one_more(written, first, held, left_out)
-        if more is None:
-            break
-        written = more
-    return written
-
-
-def _without(written: Written, first: Explanation, step: Step) -> Written:
-    """Return laws without one of the effects beside them, the others fitted anew."""
-    fitted = _fitted_without(written, first, step)
-    return _written_with(written, replace(first, steps=written.explained.steps), fitted)
-
-
-def _fitted_without(written: Written, first: Explanation, step: Step) -> _Together:
-    """Fit laws and effects without one of these, beginning with what they are, under the same discrepancy."""
-    here = written.explained
-    rest = [effect for effect in here.taken.effects if effect != step.effect]
-    start = free(first.problem.estimator.robot, rest).vector(here.taken.values)
-    return _together(first, here.problem, written.terms, rest, start)
-
-
-def _with_one_more(
-    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
-) -> Written | None:
-    """Return laws and effects with the best effect that holds beside them, of those not left out; None if none does."""
-    here = written.explained
-    problem = replace(here.problem, refused=left_out)
-    stage = tuple(candidate_steps(problem, here.taken))
-    tried = (*here.tried, stage)
-    for step in proved_steps(problem, stage):
-        effects, steps = step.model.effects, (*here.steps, replace(step, stage=len(tried) - 1))
-        start = free(first.problem.estimator.robot, effects).vector(step.model.values)
-        fitted = _together(first, problem.under(step.model), written.terms, effects, start)
-        more = _written_with(written, replace(first, steps=steps, tried=tried), fitted)
-        explained = _held_up(more.explained, held)
-        if explained:
-            return replace(more, explained=explained)
-    return None
-
-
 def _first_beside(
     refused: Sequence[Step], explained: Explanation, found: Sequence[Law], held: Residuals, nulls: Array
 ) -> _Proven | None:
@@ -332,7 +212,7 @@ def _first_beside(
     """
     tried = []
     for some in (*([step] for step in refused), *([refused] if len(refused) > 1 else ())):
-        first = _taken_back(explained, some)
+        first = taken_back(explained, some)
         library = Library(first.problem, first.taken)
         laws = sorted((fit(library, law.terms) for law in found), key=lambda law: -law.worth)
         physics = laws[0].parameters.physics(laws[0].minimum.z)
@@ -340,88 +220,10 @@ def _first_beside(
         tried.append((cost_of_all + PRICE * len(some), first, library, laws))
     for _, first, library, laws in sorted(tried, key=lambda each: each[0]):
         holds = _first_that_holds(Written(first, (), ()), first, library, laws, held, nulls)
-        held_up = _held_up(holds.written.explained, held) if holds else None
-        if holds and held_up:
-            return holds._replace(written=replace(holds.written, explained=held_up))
+        both = held_up(holds.written.explained, held) if holds else None
+        if holds and both:
+            return holds._replace(written=replace(holds.written, explained=both))
     return None
-
-
-def _taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
-    """Return an explanation with refused effects taken again, all parameters fitted anew."""
-    values = {step.effect: step.model.values[step.effect] for step in refused}
-    effects = [*explained.taken.effects, *values]
-    problem = explained.problem.under(explained.taken, effects)
-    model = problem.estimator.fit(effects, {**values, **explained.taken.values})
-    steps = (*explained.steps, *(replace(step, stage=0) for step in refused))
-    return replace(explained, problem=problem, taken=model, whole=model, steps=steps)
-
-
-def _held_up(explained: Explanation, held: Residuals) -> Explanation | None:
-    """Return an explanation all of whose effects hold beside laws, with their hold-out gains; None if any does not.
-
-    Each must be material, of one size, and asked for by the recordings set aside. Where much is left they must stand
-    out of it, as effects without laws must.
-    """
-    problem, model = explained.problem, explained.taken
-    for step in explained.steps:
-        alone = beside_others(problem, model, step)
-        if not is_material(problem, model, alone) or drifts(problem, model, alone):
-            return None
-        if explained.unexplained and not stands_out(problem, alone):
-            return None
-    steps = confirmed(explained, held).explained.steps
-    return replace(explained, steps=steps) if len(steps) == len(explained.steps) else None
-
-
-def _pruned(written: Written, first: Explanation) -> Written:
-    """Return laws without the effects that they make needless, which gain too little beside them or do not matter.
-
-    Such an effect had stood in for a law.
-    """
-    problem = written.explained.problem
-    for step in written.explained.steps:
-        without, here = _fitted_without(written, first, step), written.explained.taken
-        stays = without.cost - here.cost >= PRICE
-        if not (stays and (problem.on_bench or is_material(problem, here, step))):
-            written = _written_with(written, first, without, problem)
-    return written
-
-
-def _explained_with(
-    first: Explanation,
-    terms: Sequence[Term],
-    effects: Sequence[str],
-    values: Effects,
-    under: Problem | None = None,
-) -> Explanation:
-    """Return an explanation of a robot that has more terms, with some of the effects; ``under`` another's discrepancy.
-
-    What was too small for a name beside the unexplained is not looked at again.
-    """
-    problem = first.problem
-    robot = problem.estimator.robot
-    robot = robot.with_terms([*robot.term, *terms])
-    estimator = Estimator(problem.residuals, robot, problem.estimator.rng)
-    others = under.estimator.discrepancy if under else None
-    problem = replace(problem, estimator=estimator.under(others), place=(), kept={})
-    parameters = free(robot, effects)
-    bare = replace(first.taken, effects=tuple(effects), parameters=parameters)
-    model: Model = problem.estimator.at(bare, parameters.vector(values))
-    problem = problem if under else problem.under(model)
-    model = problem.estimator.at(model, model.z)
-    left = left_by(problem, model)
-    before = first.problem.sizes.left(first.problem.known.physics, repeatedly=True)
-    now, was = (problem.material.times(size) for size in (left, before))
-    return replace(
-        first,
-        problem=problem,
-        taken=model,
-        steps=tuple(step for step in first.steps if step.effect in effects),
-        minor=(),
-        whole=model,
-        left=left,
-        unexplained=now > SEVERAL and now / max(was, 1.0) > LAWS_LEAVE,
-    )
 
 
 def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) -> float | None:
@@ -461,27 +263,6 @@ def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
         if other.terms[0].port != law.terms[0].port and close:
             out.setdefault(other.terms[0].port, other)
     return list(out.values())
-
-
-def _with_constants_of(written: Written, first: Explanation) -> tuple[Invented, ...]:
-    """Return what the verdict says of laws, with their constants and intervals as they were fitted together last."""
-    model, problem = written.explained.taken, written.explained.problem
-    parameters = free(first.problem.estimator.robot, model.effects)
-    together = FreeTerms(parameters, model.z, written.terms)
-    residual = problem.estimator.residual(together)
-    slopes = jacobian(residual, together.z, model.errors, together.probes, together.bounds[1])
-    half = half_widths_of(slopes, model.errors, problem.estimator.blocks)[parameters.size :]
-    intervals: list[dict[str, Interval]] = [{} for _ in written.terms]
-    for c, reach in zip(together.constants, half.tolist(), strict=True):
-        ends = sorted(float(c.at(side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
-        intervals[c.term][c.name] = Interval(c.value, ends[0], ends[1], "")
-    for term, known in zip(written.terms, intervals, strict=True):
-        fixed = {name: value for name, value in term.constants.items() if name not in known}
-        known |= {name: Interval(value, value, value, "") for name, value in fixed.items()}
-    told = zip(written.invented, written.terms, intervals, strict=True)
-    return tuple(
-        replace(law, term=term, parameters=found, looks_like=looks_like(term)) for law, term, found in told
-    )
 
 
 def _told(

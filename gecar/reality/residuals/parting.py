@@ -195,7 +195,7 @@ def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:
     path_sd = np.hypot(PATH_KNOWN, (1e-3 * off.mm_1m, 1e-3 * off.mm_1m, math.radians(off.deg_1m)))
     predicted_sd = run.predicted_reading_sd(physics, path_sd)
     beyond = (run.recording.reflection_pct - run.readings(physics)) ** 2 - predicted_sd**2
-    even = beyond[predicted_sd < EVEN * run.noise.reflection_sd]
+    even = beyond[(predicted_sd < EVEN * run.noise.reflection_sd) & ~np.isnan(beyond)]
     on_even = _root_mean(even) if len(even) >= LEAST_ROWS else 0.0
     return Size(reading_pct=max(_root_mean(beyond), on_even))
 

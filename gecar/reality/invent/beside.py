@@ -1,0 +1,105 @@
+"""Effects beside laws: chosen anew after each law, taken back where none holds without them, dropped where needless."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gecar.reality.fitting.model import Step
+from gecar.reality.fitting.parameters import free
+from gecar.reality.invent.written import Written, fitted_without, together, written_with
+from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.selection.acceptance import is_material, stands_out
+from gecar.reality.selection.homogeneity import drifts
+from gecar.reality.selection.screening import candidate_steps
+from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
+from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
+
+
+def with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
+    """Choose effects anew beside the laws, one by one, as long as all hold with the laws fitted anew.
+
+    Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
+    another may have stood in for it. Robots with laws are not replayed in lock step: those effects alone are tried that
+    gained something without a law.
+    """
+    gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
+    left_out = frozenset(first.problem.catalogue) - gained - refused
+    for step in written.explained.steps:
+        without = _without(written, first, step)
+        swapped = _with_one_more(without, first, held, left_out)
+        if swapped and step.effect not in swapped.explained.taken.effects:
+            written = swapped
+    while len(written.explained.taken.effects) < MOST_EFFECTS:
+        more = _with_one_more(written, first, held, left_out)
+        if more is None:
+            break
+        written = more
+    return written
+
+
+def _without(written: Written, first: Explanation, step: Step) -> Written:
+    """Return laws without one of the effects beside them, the others fitted anew."""
+    fitted = fitted_without(written, first, step)
+    return written_with(written, replace(first, steps=written.explained.steps), fitted)
+
+
+def _with_one_more(
+    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
+) -> Written | None:
+    """Return laws and effects with the best effect that holds beside them, of those not left out; None if none does."""
+    here = written.explained
+    problem = replace(here.problem, refused=left_out)
+    stage = tuple(candidate_steps(problem, here.taken))
+    tried = (*here.tried, stage)
+    for step in proved_steps(problem, stage):
+        effects, steps = step.model.effects, (*here.steps, replace(step, stage=len(tried) - 1))
+        start = free(first.problem.estimator.robot, effects).vector(step.model.values)
+        fitted = together(first, problem.under(step.model), written.terms, effects, start)
+        more = written_with(written, replace(first, steps=steps, tried=tried), fitted)
+        explained = held_up(more.explained, held)
+        if explained:
+            return replace(more, explained=explained)
+    return None
+
+
+def held_up(explained: Explanation, held: Residuals) -> Explanation | None:
+    """Return an explanation all of whose effects hold beside laws, with their hold-out gains; None if any does not.
+
+    Each must be material, of one size, and asked for by the recordings set aside. Where much is left they must stand
+    out of it, as effects without laws must.
+    """
+    problem, model = explained.problem, explained.taken
+    for step in explained.steps:
+        alone = beside_others(problem, model, step)
+        if not is_material(problem, model, alone) or drifts(problem, model, alone):
+            return None
+        if explained.unexplained and not stands_out(problem, alone):
+            return None
+    steps = confirmed(explained, held).explained.steps
+    return replace(explained, steps=steps) if len(steps) == len(explained.steps) else None
+
+
+def pruned(written: Written, first: Explanation) -> Written:
+    """Return laws without the effects that they make needless, which gain too little beside them or do not matter.
+
+    Such an effect had stood in for a law.
+    """
+    problem = written.explained.problem
+    for step in written.explained.steps:
+        without, here = fitted_without(written, first, step), written.explained.taken
+        stays = without.cost - here.cost >= PRICE
+        if not (stays and (problem.on_bench or is_material(problem, here, step))):
+            written = written_with(written, first, without, problem)
+    return written
+
+
+def taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
+    """Return an explanation with refused effects taken again, all parameters fitted anew."""
+    values = {step.effect: step.model.values[step.effect] for step in refused}
+    effects = [*explained.taken.effects, *values]
+    problem = explained.problem.under(explained.taken, effects)
+    model = problem.estimator.fit(effects, {**values, **explained.taken.values})
+    steps = (*explained.steps, *(replace(step, stage=0) for step in refused))
+    return replace(explained, problem=problem, taken=model, whole=model, steps=steps)
