@@ -24,7 +24,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip the tests marked slow, unless they are asked for: without them the suite takes less than 15 minutes."""
+    """Skip the tests marked slow, unless they are asked for: five of them take a fifth of the suite's time."""
     if not config.getoption("--slow"):
         for item in items:
             if item.get_closest_marker("slow"):
