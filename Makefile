@@ -3,9 +3,8 @@
 
 VENV := .venv
 PY := $(VENV)/bin/python
-PIP := $(PY) -m pip --disable-pip-version-check
 # Python compiles a module when it is first imported: to compile all that libraries bring takes as long as to install them.
-INSTALL := $(PIP) install --quiet --no-compile --editable
+INSTALL := $(PY) -m pip --disable-pip-version-check install --quiet --no-compile --editable
 ARGS ?=
 
 # The first Python here that is new enough; set it yourself with: make env PYTHON=/path/to/python3.12

@@ -17,6 +17,7 @@ from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.profile import reaches, refitted
 from gecar.reality.optimisation.least_squares import Residual
+from gecar.reality.residuals.of_case import Residuals
 
 Array = npt.NDArray[np.float64]
 
@@ -46,8 +47,13 @@ def _own(model: Model) -> npt.NDArray[np.intp]:
     return np.flatnonzero([c.effect.id == EFFECT for c in model.parameters.coordinates])
 
 
+def on_even_floor(residuals: Residuals) -> npt.NDArray[np.bool_]:
+    """Return which readings were taken where the floor is even, shape (n,): an uncertain path hardly changes them."""
+    even: npt.NDArray[np.bool_] = residuals.reading_sd <= EVEN * residuals.recordings[0].noise.reflection_sd
+    return even
+
+
 def _weighted(estimator: Estimator, model: Model) -> Residual:
     residual = estimator.residual(model.parameters)
-    sd, even = estimator.residuals.reading_sd, estimator.residuals.recordings[0].noise.reflection_sd
-    weight = np.where(sd > EVEN * even, 1.0 / EDGE_CAUTION, 1.0)
+    weight = np.where(on_even_floor(estimator.residuals), 1.0, 1.0 / EDGE_CAUTION)
     return lambda z: residual(z) * weight

@@ -1,4 +1,4 @@
-"""Effects beside laws: chosen anew after each law, taken back where none holds without them, dropped where needless."""
+"""Effects beside laws: which are added after a law, exchanged, dropped, or taken back after they were refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
 
 
 def with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
-    """Choose effects anew beside the laws, one by one, as long as all hold with the laws fitted anew.
+    """Exchange and add effects beside the laws, one at a time, while all of them hold with every constant fitted again.
 
     Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
     another may have stood in for it. Robots with laws are not replayed in lock step: those effects alone are tried that
@@ -40,7 +40,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals, refused:
 
 
 def _without(written: Written, first: Explanation, step: Step) -> Written:
-    """Return laws without one of the effects beside them, the others fitted anew."""
+    """Return the laws without one of the effects beside them, everything else fitted again."""
     fitted = fitted_without(written, first, step)
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
 
@@ -48,7 +48,7 @@ def _without(written: Written, first: Explanation, step: Step) -> Written:
 def _with_one_more(
     written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
 ) -> Written | None:
-    """Return laws and effects with the best effect that holds beside them, of those not left out; None if none does."""
+    """Add the best effect that holds beside laws and effects, of those not left out; None if there is none."""
     here = written.explained
     problem = replace(here.problem, refused=left_out)
     stage = tuple(candidate_steps(problem, here.taken))
@@ -65,7 +65,7 @@ def _with_one_more(
 
 
 def held_up(explained: Explanation, held: Residuals) -> Explanation | None:
-    """Return an explanation all of whose effects hold beside laws, with their hold-out gains; None if any does not.
+    """Return an explanation with its hold-out gains if all of its effects hold beside laws; else None.
 
     Each must be material, of one size, and asked for by the recordings set aside. Where much is left they must stand
     out of it, as effects without laws must.
@@ -82,7 +82,7 @@ def held_up(explained: Explanation, held: Residuals) -> Explanation | None:
 
 
 def pruned(written: Written, first: Explanation) -> Written:
-    """Return laws without the effects that they make needless, which gain too little beside them or do not matter.
+    """Drop the effects that gain too little beside the laws, or are not material there.
 
     Such an effect had stood in for a law.
     """
@@ -96,7 +96,7 @@ def pruned(written: Written, first: Explanation) -> Written:
 
 
 def taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
-    """Return an explanation with refused effects taken again, all parameters fitted anew."""
+    """Return an explanation with refused effects added, all parameters fitted again."""
     values = {step.effect: step.model.values[step.effect] for step in refused}
     effects = [*explained.taken.effects, *values]
     problem = explained.problem.under(explained.taken, effects)

@@ -188,7 +188,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
 
 
 def _has_one_size(library: Library, law: Law) -> bool:
-    """Whether a law has one size in all recordings, and at all moments if it is of readings, as effects must."""
+    """Whether a law has one size in all recordings and, if it changes readings, from moment to moment."""
     if _spread(library, law) >= DRIFTING:
         return False
     if any(term.port != "colour_reading" for term in law.terms):

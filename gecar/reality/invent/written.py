@@ -20,8 +20,7 @@ from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.search import Law, Library
 from gecar.reality.optimisation.least_squares import jacobian, least_squares
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.stepwise import Explanation, left_by
-from gecar.reality.selection.thresholds import SEVERAL
+from gecar.reality.selection.stepwise import Explanation, is_much, left_before, left_by
 from gecar.reality.uncertainty.intervals import half_widths_of
 from gecar.reality.verdict import Interval, Invented
 from gecar.world.terms import Term
@@ -52,15 +51,13 @@ class Written:
 
 
 def added(written: Written, first: Explanation, library: Library, law: Law) -> Written:
-    """Return laws with one more, all constants fitted together anew, and what is left then."""
-    effects = library.model.effects
-    parameters = free(first.problem.estimator.robot, effects)
-    terms, start = (*written.terms, *law.terms), law.minimum.z[: parameters.size]
-    return written_with(written, first, together(first, library.problem, terms, effects, start))
+    """Return the laws with one more, all constants fitted again together, and what they leave unexplained."""
+    terms, start = (*written.terms, *law.terms), law.minimum.z[: law.parameters.model.size]
+    return written_with(written, first, together(first, library.problem, terms, library.model.effects, start))
 
 
 class Together(NamedTuple):
-    """Laws and effects whose constants were fitted together: both, the effects' values, and what they cost."""
+    """Laws and effects that were fitted together, with the effects' values and the cost of the fit."""
 
     terms: tuple[Term, ...]
     effects: tuple[str, ...]
@@ -71,25 +68,24 @@ class Together(NamedTuple):
 def together(
     first: Explanation, under: Problem, terms: tuple[Term, ...], effects: Sequence[str], start: Array
 ) -> Together:
-    """Fit all constants of laws and effects; these begin at the vector ``start``, under a problem's discrepancy."""
+    """Fit the constants of laws and effects under a problem's discrepancy; those of effects begin at ``start``."""
     parameters = free(first.problem.estimator.robot, effects)
-    together = FreeTerms(parameters, start, terms)
-    residual = under.estimator.residual(together)
-    found = least_squares(residual, together.z, together.bounds, together.probes, ROUNDS)
+    both = FreeTerms(parameters, start, terms)
+    found = least_squares(under.estimator.residual(both), both.z, both.bounds, both.probes, ROUNDS)
     values = parameters.values(found.z[: parameters.size])
-    return Together(together.fitted(found.z), tuple(effects), values, found.cost)
+    return Together(both.fitted(found.z), tuple(effects), values, found.cost)
 
 
 def written_with(
     written: Written, first: Explanation, fitted: Together, under: Problem | None = None
 ) -> Written:
-    """Return laws as they were fitted together with effects, and what is left then; ``under`` as `_explained_with`."""
+    """Return laws and effects as they were fitted, and what they leave; ``under`` as in `_explained_with`."""
     explained = _explained_with(first, fitted.terms, fitted.effects, fitted.values, under)
     return replace(written, explained=explained, terms=fitted.terms)
 
 
 def fitted_without(written: Written, first: Explanation, step: Step) -> Together:
-    """Fit laws and effects without one of these, beginning with what they are, under the same discrepancy."""
+    """Fit laws and effects again without one of the effects, from their present values, under the same discrepancy."""
     here = written.explained
     rest = [effect for effect in here.taken.effects if effect != step.effect]
     start = free(first.problem.estimator.robot, rest).vector(here.taken.values)
@@ -103,7 +99,7 @@ def _explained_with(
     values: Effects,
     under: Problem | None = None,
 ) -> Explanation:
-    """Return an explanation of a robot that has more terms, with some of the effects; ``under`` another's discrepancy.
+    """Return the explanation by a robot with laws and some of the effects, under its own discrepancy or ``under``'s.
 
     What was too small for a name beside the unexplained is not looked at again.
     """
@@ -119,8 +115,6 @@ def _explained_with(
     problem = problem if under else problem.under(model)
     model = problem.estimator.at(model, model.z)
     left = left_by(problem, model)
-    before = first.problem.sizes.left(first.problem.known.physics, repeatedly=True)
-    now, was = (problem.material.times(size) for size in (left, before))
     return replace(
         first,
         problem=problem,
@@ -129,20 +123,20 @@ def _explained_with(
         minor=(),
         whole=model,
         left=left,
-        unexplained=now > SEVERAL and now / max(was, 1.0) > LAWS_LEAVE,
+        unexplained=is_much(problem.material.times(left), left_before(first.problem), LAWS_LEAVE),
     )
 
 
 def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, ...]:
-    """Return what the verdict says of laws, with their constants and intervals as they were fitted together last."""
+    """Return what the verdict says of laws, with the constants of their last fit and their intervals."""
     model, problem = written.explained.taken, written.explained.problem
     parameters = free(first.problem.estimator.robot, model.effects)
-    together = FreeTerms(parameters, model.z, written.terms)
-    residual = problem.estimator.residual(together)
-    slopes = jacobian(residual, together.z, model.errors, together.probes, together.bounds[1])
+    both = FreeTerms(parameters, model.z, written.terms)
+    residual = problem.estimator.residual(both)
+    slopes = jacobian(residual, both.z, model.errors, both.probes, both.bounds[1])
     half = half_widths_of(slopes, model.errors, problem.estimator.blocks)[parameters.size :]
     intervals: list[dict[str, Interval]] = [{} for _ in written.terms]
-    for c, reach in zip(together.constants, half.tolist(), strict=True):
+    for c, reach in zip(both.constants, half.tolist(), strict=True):
         ends = sorted(float(c.at(side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
         intervals[c.term][c.name] = Interval(c.value, ends[0], ends[1], "")
     for term, known in zip(written.terms, intervals, strict=True):

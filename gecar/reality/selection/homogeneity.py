@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from gecar.reality.fitting.gain_offset import EFFECT as GAIN
-from gecar.reality.fitting.gain_offset import EVEN
+from gecar.reality.fitting.gain_offset import on_even_floor
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.residuals.of_case import Physics, Residuals
@@ -66,12 +66,13 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     model, step
         The model, and the step that took the effect.
     """
+    if step.effect == GAIN and flickers(problem.residuals, step.base.physics, step.model.physics):
+        return True
     unknown = tuple(model.errors for model in problem.estimator.models_of(step))
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
     chance = SIGNIFICANCE / len(splits)  # Bonferroni
-    is_gain = step.effect == GAIN
-    return (is_gain and flickers(problem.residuals, step.base.physics, step.model.physics)) or all(
+    return all(
         any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
         for errors, least in ((unknown, DRIFTING), (known, BESIDE_CHANGES))
     )
@@ -142,6 +143,6 @@ def flickers(residuals: Residuals, without: Physics, with_it: Physics) -> bool:
     index = residuals.index
     moment = (index.t_s / MOMENT_S).astype(np.intp)
     moments = index.recording.astype(np.intp) * (int(moment.max(initial=0)) + 1) + moment
-    even = residuals.reading_sd <= EVEN * residuals.recordings[0].noise.reflection_sd
+    even = on_even_floor(residuals)
     before, after = (residuals.errors(physics)[even] for physics in (without, with_it))
     return _differs(heterogeneity(moments[even], before, after), DRIFTING, SIGNIFICANCE)

@@ -144,7 +144,7 @@ def concluded(
 ) -> Explanation:
     """Keep the effects that are findings, and judge what they leave; ``drifting`` are known to differ in size."""
     problem = problem.under(model)
-    before = problem.material.times(problem.sizes.left(problem.known.physics, repeatedly=True))
+    before = left_before(problem)
     while True:
         weakest = _weakest_drifting(problem, model, steps)
         if weakest is not None:
@@ -165,7 +165,7 @@ def concluded(
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
         left = left_by(problem, model)
-    much = _is_much(model, problem.material.times(left), before)
+    much = is_much(problem.material.times(left), before, left_share(model.effects))
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
@@ -178,7 +178,7 @@ def _standing_beside(
     where they leave much of it: the most uneven goes first, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
-    if not _is_much(model, now, before):
+    if not is_much(now, before, left_share(model.effects)):
         return list(steps)
     kept = [
         step
@@ -222,9 +222,23 @@ def beside_others(problem: Problem, model: Model, step: Step) -> Step:
     return replace(step, base=base, model=whole, gain=base.cost - whole.cost)
 
 
-def _is_much(model: Model, now: float, before: float) -> bool:
-    """Whether a model leaves something material, which its laws are not to blame for; in times the line, before too."""
-    return now > SEVERAL and now / max(before, 1.0) > left_share(model.effects)
+def left_before(problem: Problem) -> float:
+    """Return what the robot leaves with nothing fitted, in times the material size."""
+    left = problem.once("before", make=lambda: problem.sizes.left(problem.known.physics, repeatedly=True))
+    return problem.material.times(left)
+
+
+def is_much(now: float, before: float, allowed: float) -> bool:
+    """Whether a model leaves more than is material, and than the share of the error that its own laws may leave.
+
+    Parameters
+    ----------
+    now, before
+        What is left, with the model and with nothing fitted, in times the material size.
+    allowed
+        That share.
+    """
+    return now > SEVERAL and now / max(before, 1.0) > allowed
 
 
 def left_share(effects: Sequence[str]) -> float:
