@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 
 import numpy as np
 
+from gecar.compiled import LANES
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.replay.replayer import replayer_of
 from gecar.world.course.course import load_course
-from gecar.world.kernel.lock_step import LANES
-from gecar.world.robot import load_robot
+from gecar.world.robot import Robot, load_robot
 from gecar.world.rollout import World, simulate
+from gecar.world.terms import Term
 
 SECONDS = 12.0
 PROGRAM = "motor(60,40,200)\nmotor(-50,50,180)\nmotor(30,80,150)\nmotor(-40,-70,120)\nmotor(-60,-50,190)\n"
@@ -23,15 +23,19 @@ def rows() -> list[tuple[str, str, str]]:
     """Return this benchmark's rows: figure, value, goal."""
     recording = recorded()
     slippery = {"slippery_patch": {"radius_m": 0.3, "x_m": 0.3, "y_m": 0.9, "coefficient": 0.1}}
-    kinds: dict[str, dict[str, dict[str, float]]] = {
-        "plain robots": {}, "with a dead band": {"dead_band": {"duty_pct": 3.0}}, "with a slippery patch": slippery,
-    }  # fmt: skip
+    ev3 = load_robot("ev3")
+    kinds = {
+        "plain robots": ev3,
+        "with a dead band": ev3.with_effects({"dead_band": {"duty_pct": 3.0}}),
+        "with a slippery patch": ev3.with_effects(slippery),
+        "with a law": ev3.with_terms([Term(port="motor_torque", law="-a * speed * abs(speed)", a=1e-5)]),
+    }
     return [
         ("12 s replayed whole", f"{replay_ms(recording, np.inf):.2f} ms", "<= 1.5 ms"),
         ("12 s replayed, re-based over 1 s", f"{replay_ms(recording, 1.0):.2f} ms", "<= 1.5 ms"),
         *(
-            (f"{LANES} robots one by one : in lock step, {name}", f"{gain(recording, effects):.1f}", ">= 1.5")
-            for name, effects in kinds.items()
+            (f"{LANES} robots one by one : in lock step, {name}", f"{gain(recording, robot):.1f}", ">= 1.5")
+            for name, robot in kinds.items()
         ),
     ]
 
@@ -68,12 +72,9 @@ def replay_ms(recording: Recording, memory_s: float, repeats: int = 200) -> floa
     return 1e3 * best
 
 
-def gain(recording: Recording, effects: Mapping[str, Mapping[str, float]], repeats: int = 100) -> float:
+def gain(recording: Recording, robot: Robot, repeats: int = 100) -> float:
     """Return how many times longer robots take one by one than in lock step: shortest times, taken in turn."""
-    replayer, physics = (
-        replayer_of(recording, memory_s=1.0),
-        np.repeat(load_robot("ev3").with_effects(effects).physics, LANES),
-    )
+    replayer, physics = replayer_of(recording, memory_s=1.0), np.repeat(robot.physics, LANES)
     physics["mass"] *= np.linspace(0.9, 1.1, LANES)
     singles = [physics[k : k + 1] for k in range(LANES)]
     shortest = [float("inf"), float("inf")]

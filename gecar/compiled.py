@@ -24,6 +24,8 @@ from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 _KEPT_CACHES = 4
+LANES = 8
+"""Robots that kernels take through a step at once: two vectors of AVX2, one of AVX-512."""
 
 
 def _kernel_hash(package: Path) -> str:

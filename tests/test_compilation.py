@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from concealing import EV3, recorded
 
+from gecar.compiled import LANES
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.replay import kernel
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.residuals import compilation
 from gecar.reality.residuals.of_recording import residuals_of
-from gecar.world.kernel.lock_step import LANES
 
-DISPATCHERS = (kernel._replay_one, kernel._replay_lanes, kernel._replay_with_terms, readings_along)
+DISPATCHERS = (kernel._replay_one, kernel._replay_lanes, kernel._replay_lanes_with_terms, readings_along)
 
 
 def test_other_recordings_need_nothing_else_compiled() -> None:
@@ -23,7 +23,7 @@ def test_other_recordings_need_nothing_else_compiled() -> None:
     run = recorded(EV3, 0)
     replayed = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, None)
     replayed.motion_errors(np.repeat(EV3.physics, LANES))
-    replayed.motion_errors(EV3.with_terms([compilation.LAW]).physics)
+    replayed.motion_errors(np.repeat(EV3.with_terms([compilation.LAW]).physics, LANES))
     assert [list(each.signatures) for each in DISPATCHERS] == before
 
 

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from acting import strong
 
+from gecar.compiled import LANES
+from gecar.reality.invent.sentences import linear, physics_grammar, single_laws
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import _between
 from gecar.reality.replay.replayer import replay, replayer_of
 from gecar.world.effects import CATALOGUE
-from gecar.world.kernel.lock_step import LANES
+from gecar.world.ports import BY_PORT, CONSTANTS
 from gecar.world.robot import load_robot
+from gecar.world.terms import Term
 
 EV3 = load_robot("ev3")
 
@@ -156,6 +159,40 @@ def test_robots_in_lock_step_are_replayed_as_each_alone(memory_s: float, rig: st
             alone = replayer.play(physics[k : k + 1])
             apart = np.concatenate([alone.row_errors.T.ravel(), alone.pose_errors.T.ravel()])
             np.testing.assert_array_equal(together[k], apart)
+
+
+def robots_with_laws() -> np.ndarray:
+    """Physics of robots with two laws each: those of every port, some in two sizes; shape (n,)."""
+    singles = single_laws(physics_grammar())
+    at_port = {
+        laws[0].port: [other for other in singles if other[0].port == laws[0].port] for laws in singles
+    }
+    chosen = [laws for here in at_port.values() for laws in here[:: max(len(here) // 12, 1)]]
+    drag = Term(port="motor_torque", law="-a * speed * abs(speed)", a=1e-5)
+    robots = []
+    for laws in chosen:
+        for size in (0.01, 0.02):
+            sized = [law.with_constants({linear(law)[0]: size * BY_PORT[law.port].worth}) for law in laws]
+            robots.append(EV3.with_terms([*sized, drag]))
+    return np.concatenate([robot.physics for robot in robots])
+
+
+@pytest.mark.parametrize("rig", ["floor", "bench"])
+def test_robots_with_laws_in_lock_step_are_replayed_as_each_alone(rig: str) -> None:
+    physics = robots_with_laws()
+    replayer = replayer_of(driven(steps, waves, seconds=2.0, rig=rig), memory_s=1.0)
+    together = replayer.errors(physics)
+    plain = replayer.errors(EV3.physics)
+    assert len(np.unique(together, axis=0)) > 0.5 * len(physics)
+    assert not (together == plain).all(axis=1).any()
+    for k in range(len(physics)):
+        np.testing.assert_array_equal(together[k], replayer.errors(physics[k : k + 1])[0])
+    # The same formula eight times is worked out token by token for all at once.
+    some = np.repeat(physics[::16], LANES)
+    some["terms"][:, 1, CONSTANTS] *= np.tile(np.linspace(0.5, 1.5, LANES), len(some) // LANES)
+    together = replayer.errors(some)
+    for k in range(len(some)):
+        np.testing.assert_array_equal(together[k], replayer.errors(some[k : k + 1])[0])
 
 
 def test_robots_told_at_other_times_are_replayed_apart() -> None:

@@ -22,9 +22,9 @@ from gecar.world.kernel.dynamics import has_terms
 from gecar.world.kernel.eyes import EYES, Floor
 from gecar.world.kernel.interpreter import CONTROL
 from gecar.world.kernel.lanes import Ends, Jobs, drive_lanes, make_memory
+from gecar.world.kernel.laws import N_STORES
 from gecar.world.kernel.sensing import RING
 from gecar.world.kernel.state import STATE
-from gecar.world.kernel.terms import STORES
 from gecar.world.pymunk_space import build_engine
 from gecar.world.robot import Robot
 
@@ -225,7 +225,7 @@ class Driver:
             np.zeros(1, CONTROL),
             eyes,
             np.zeros(2 * RING),
-            np.zeros(1, STORES),
+            np.zeros(N_STORES),
             NO_ENGINE,
             np.zeros(1),
         )

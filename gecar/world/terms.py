@@ -363,6 +363,23 @@ def rows_of(terms: Sequence[Term]) -> npt.NDArray[np.float64]:
     return rows
 
 
+def formulas_of(physics: npt.NDArray[Any]) -> list[bytes]:
+    """Return of each robot what its terms are but for constants: equal where laws differ in these alone.
+
+    ``physics`` has dtype `gecar.world.effects.PHYSICS` and shape (n,), as in `ports_of`.
+    """
+    rows = physics["terms"].copy()
+    rows[:, :, [STORE_S, AT_X, AT_Y, *range(CONSTANTS, LAW)]] = 0.0
+    return [robot.tobytes() for robot in rows]
+
+
+def ports_of(physics: npt.NDArray[Any]) -> list[bytes]:
+    """Return of each robot where its terms act and what kind of store they have: what lanes of the kernel share."""
+    rows = physics["terms"][:, :, [PORT, SIDE, OF_ITSELF, STORE_LENGTH]]
+    rows[:, :, 3] = rows[:, :, 3] > 0.0
+    return [robot.tobytes() + bytes([int(n)]) for robot, n in zip(rows, physics["n_terms"], strict=True)]
+
+
 def _pretty(formula: str) -> str:
     """Return a formula as it would be printed."""
     formula = re.sub(r"abs\(([^()]+)\)", r"|\1|", formula)

@@ -21,8 +21,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals, refused:
     """Exchange and add effects beside the laws, one at a time, while all of them hold with every constant fitted again.
 
     Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
-    another may have stood in for it. Robots with laws are not replayed in lock step: those effects alone are tried that
-    gained something without a law.
+    another may have stood in for it. To save time those effects alone are tried that gained something without a law.
     """
     gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
     left_out = frozenset(first.problem.catalogue) - gained - refused

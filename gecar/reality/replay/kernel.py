@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import kernel, lane_access
+from gecar.compiled import LANES, kernel, lane_access
 from gecar.reality.replay.kernel_input import Kept, KernelInput
 from gecar.reality.replay.pose_filter import (
     FILTER,
@@ -30,11 +30,12 @@ from gecar.reality.replay.pose_filter import (
     predict_pose,
     rebase,
 )
-from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, step_with_terms
+from gecar.world.kernel.dynamics import bench_step_with_terms, has_terms
+from gecar.world.kernel.laws import N_STORES
 from gecar.world.kernel.lock_step import (
-    LANES,
     N_FIELDS,
     advance_lanes,
+    advance_lanes_with_terms,
     lane_memory,
     load_acting,
     load_derived,
@@ -53,9 +54,10 @@ from gecar.world.kernel.terms import (
     PORT_POSE_HEADING,
     PORT_POSE_X,
     PORT_POSE_Y,
-    STORES,
     reading_error,
 )
+from gecar.world.ports import N_TERMS, PORT
+from gecar.world.terms import formulas_of
 
 Array = npt.NDArray[np.float64]
 
@@ -70,10 +72,11 @@ TIMING = ("clock_skew", "actuation_delay", "pose_delay", "duty_cap")
 _ROW = (
     "left_error right_error battery_error yaw_error "
     "left_angle right_angle battery yaw_rate x y heading left_speed right_speed ahead aside "
-    "yaw_1_ago yaw_2_ago yaw_3_ago"
+    "yaw_1_ago yaw_2_ago yaw_3_ago left_off right_off battery_off yaw_off"
 )
 ROW = np.dtype([(field, np.float64) for field in _ROW.split()])
-"""Normalised residuals at a row; what is predicted there, in the order of the columns above; yaw rates steps ago."""
+"""Normalised residuals at a row; what is predicted there, in the order of the columns above; yaw rates steps ago; what
+terms add to what is measured."""
 
 _OF_ROW = N_FIELDS + len(FILTER.descr)
 _OF_POSE = _OF_ROW + len(ROW.descr)
@@ -116,7 +119,9 @@ def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
 
 
 @kernel
-def _compare_row(i: int, back: float, inputs: KernelInput, weights: Array, flat: Array, lanes: int) -> None:
+def _compare_row(
+    i: int, back: float, inputs: KernelInput, weights: Array, flat: Array, lanes: int, terms: bool
+) -> None:
     """Predict and compare at a row, and draw the wheel angles towards it; ``weights`` as in `_weigh`."""
     measured, sd = inputs.measured, inputs.sd
     left, right, battery = measured[i, 0], measured[i, 1], measured[i, 2]
@@ -128,6 +133,10 @@ def _compare_row(i: int, back: float, inputs: KernelInput, weights: Array, flat:
         p = load_physics(flat, lanes, lane)
         r = _load_row(flat, lanes, lane)
         _predict_row(s, p, back, r)
+        if terms:
+            r.left_angle += r.left_off
+            r.right_angle += r.right_off
+            r.battery += r.battery_off
         r.left_error = (left - r.left_angle) / angle_sd
         r.right_error = (right - r.right_angle) / angle_sd
         r.battery_error = (battery - r.battery) / battery_sd
@@ -148,20 +157,24 @@ def _compare_yaw_rates(
     kept: Kept,
     flat: Array,
     lanes: int,
-    off: float,
+    robots: npt.NDArray[Any],
+    reads: bool,
 ) -> int:
     """Predict, compare and keep the yaw rates of rows up to one and a half steps ago; return the row after them.
 
     They begin with row ``i``. Velocities are those of the middle of a step, and rows lie between two middles. Taken as
     they are, rows on the edge of two steps would jump from one to the other as a clock is a little faster or slower.
-    Terms add ``off`` to each.
     """
     while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now - 1.5 * dt + 1e-9:
         share = 2.5 - (now - inputs.t[i] * stretch) / dt
+        if reads:
+            _set_off_of_yaw_rate(flat, lanes, robots)
         for lane in range(lanes):
             s = load_state(flat, lanes, lane)
             r = _load_row(flat, lanes, lane)
-            rate = _between(r.yaw_3_ago, r.yaw_2_ago, r.yaw_1_ago, s.yaw_rate, share) + off
+            rate = _between(r.yaw_3_ago, r.yaw_2_ago, r.yaw_1_ago, s.yaw_rate, share)
+            if reads:
+                rate += r.yaw_off
             kept.row_errors[i, 3 * lanes + lane] = (inputs.measured[i, 3] - rate) / inputs.sd[2]
             if kept.rows.shape[0] > 0:
                 kept.rows[i, YAW_RATE * lanes + lane] = rate
@@ -206,7 +219,9 @@ def _weigh(i: int, inputs: KernelInput, weights: Array) -> None:
 
 
 @kernel
-def _compare_pose(j: int, back: float, elapsed: float, inputs: KernelInput, flat: Array, lanes: int) -> None:
+def _compare_pose(
+    j: int, back: float, elapsed: float, inputs: KernelInput, flat: Array, lanes: int, terms: bool
+) -> None:
     """Predict and compare at a pose, and move the robot towards it."""
     x, y, heading = inputs.pose[j, 0], inputs.pose[j, 1], inputs.pose[j, 2]
     place_sd, turn_sd = inputs.sd[3], inputs.sd[4]
@@ -219,6 +234,10 @@ def _compare_pose(j: int, back: float, elapsed: float, inputs: KernelInput, flat
         f = _load_filter(flat, lanes, lane)
         r = _load_pose(flat, lanes, lane)
         predict_pose(s, p, back, r)
+        if terms:
+            r.x += r.x_off
+            r.y += r.y_off
+            r.heading += r.heading_off
         if endless:
             r.x_error = (x - r.x) / place_sd
             r.y_error = (y - r.y) / place_sd
@@ -276,59 +295,80 @@ def _keep(flat: Array, first: int, predicted: Array, errors: Array, row: int) ->
 
 
 @kernel
-def _off(flat: Array, laws: Any, stores: Any, off: Array) -> None:
-    """Set what terms add to a row's left angle, right angle and battery, shape (3,) of the four."""
-    s, p = load_state(flat, 1, 0), load_physics(flat, 1, 0)
-    off[0] = reading_error(PORT_ENCODER, 0, s, p, laws)
-    off[1] = reading_error(PORT_ENCODER, 1, s, p, laws)
-    off[2] = stores.supply_voltage
-
-
-@kernel
-def _pose_off(flat: Array, laws: Any, off: Array) -> None:
-    """Set what terms add to a pose, shape (3,) of the four."""
-    s, p = load_state(flat, 1, 0), load_physics(flat, 1, 0)
-    off[0] = reading_error(PORT_POSE_X, 0, s, p, laws)
-    off[1] = reading_error(PORT_POSE_Y, 0, s, p, laws)
-    off[2] = reading_error(PORT_POSE_HEADING, 0, s, p, laws)
-
-
-@kernel
-def _yaw_off(flat: Array, laws: Any) -> float:
-    """Return what terms add to a row's yaw rate."""
-    return reading_error(PORT_GYRO, 0, load_state(flat, 1, 0), load_physics(flat, 1, 0), laws)
-
-
-@kernel
-def _shift(values: Array, row: int, count: int, off: Array, sign: float) -> None:
-    """Add to the first few numbers of a row."""
-    for k in range(count):
-        values[row, k] += sign * off[k]
-
-
-@kernel
-def _advance_with_terms(left: float, right: float, bench: bool, laws: Any, stores: Any, flat: Array) -> None:
-    """Advance a robot with terms by one step."""
-    s, c = load_state(flat, 1, 0), load_derived(flat, 1, 0)
+def _advance_with_terms(
+    left: float,
+    right: float,
+    bench: bool,
+    robots: npt.NDArray[Any],
+    alike: bool,
+    stores: Array,
+    flat: Array,
+    lanes: int,
+) -> None:
+    """Do the same for robots with terms; on a bench for one alone."""
     if bench:
-        bench_step_with_terms(s, left, right, laws, c, stores)
-    else:
-        step_with_terms(s, left, right, laws, c, stores)
-        drift(s, c)
-    store_state(flat, 1, 0, s)
-    store_derived(flat, 1, 0, c)
+        s = load_state(flat, lanes, 0)
+        bench_step_with_terms(s, left, right, robots, load_derived(flat, lanes, 0), stores)
+        store_state(flat, lanes, 0, s)
+        return
+    for lane in range(lanes):
+        a = load_acting(flat, lanes, lane)
+        a.left, a.right = left, right
+        store_acting(flat, lanes, lane, a)
+    advance_lanes_with_terms(flat, lanes, robots, alike, stores)
 
 
-def _replay_kernel(lanes: int, terms: bool = False) -> Any:  # noqa: C901
-    """Return the compiled replay of so many robots, or of one with terms.
+@kernel
+def _at_readings(laws: Any) -> bool:
+    """Whether any term of a robot acts on what is measured."""
+    found = False
+    for k in range(int(laws.n_terms)):
+        found = found or laws.terms[k, PORT] >= PORT_ENCODER
+    return found
+
+
+@kernel
+def _set_off_of_row(flat: Array, lanes: int, robots: npt.NDArray[Any], stores: Array, reads: bool) -> None:
+    """Set what terms add to a row's angles and battery."""
+    for lane in range(lanes):
+        r = _load_row(flat, lanes, lane)
+        r.battery_off = stores[2 * N_TERMS * lanes + lane]
+        if reads:
+            s, p = load_state(flat, lanes, lane), robots[lane]
+            r.left_off = reading_error(PORT_ENCODER, 0, s, p, p)
+            r.right_off = reading_error(PORT_ENCODER, 1, s, p, p)
+        _store_row(flat, lanes, lane, r)
+
+
+@kernel
+def _set_off_of_yaw_rate(flat: Array, lanes: int, robots: npt.NDArray[Any]) -> None:
+    """Set what terms add to a yaw rate."""
+    for lane in range(lanes):
+        r, p = _load_row(flat, lanes, lane), robots[lane]
+        r.yaw_off = reading_error(PORT_GYRO, 0, load_state(flat, lanes, lane), p, p)
+        _store_row(flat, lanes, lane, r)
+
+
+@kernel
+def _set_off_of_pose(flat: Array, lanes: int, robots: npt.NDArray[Any]) -> None:
+    """Set what terms add to a pose."""
+    for lane in range(lanes):
+        s, p, r = load_state(flat, lanes, lane), robots[lane], _load_pose(flat, lanes, lane)
+        r.x_off = reading_error(PORT_POSE_X, 0, s, p, p)
+        r.y_off = reading_error(PORT_POSE_Y, 0, s, p, p)
+        r.heading_off = reading_error(PORT_POSE_HEADING, 0, s, p, p)
+        _store_pose(flat, lanes, lane, r)
+
+
+def _replay_kernel(lanes: int, terms: bool) -> Any:
+    """Return the compiled replay of so many robots, that may have terms or have none.
 
     Plain robots have no replay of their own: few are among those that are fitted, and it took 20 s to compile.
-    With terms ``inputs`` is overwritten: what they add to a reading is taken off what was measured.
     """
 
-    def replay(  # noqa: C901
+    def replay(
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
-        flat: Array, weights: Array, stores: npt.NDArray[Any], kept: Kept,
+        flat: Array, weights: Array, stores: Array, kept: Kept, alike: bool,
     ) -> None:  # fmt: skip
         _begin(physics, start, dt, flat, lanes)
         shared = physics[0]
@@ -338,31 +378,24 @@ def _replay_kernel(lanes: int, terms: bool = False) -> Any:  # noqa: C901
         before = 0.0
         i = j = g = n = 0
         at = -1
-        off = weights[4:]
+        acts = terms and shared.n_terms > 0.0
+        reads = acts and _at_readings(shared)
         while True:
             now = n * dt
             while i < inputs.t.shape[0] and inputs.t[i] * stretch <= now + 1e-9:
-                if terms:
-                    _off(flat, shared, stores[0], off)
-                    _shift(inputs.measured, i, 3, off, -1.0)
+                if acts:
+                    _set_off_of_row(flat, lanes, physics, stores, reads)
                 _weigh(i, inputs, weights)
-                _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes)
+                _compare_row(i, now - inputs.t[i] * stretch, inputs, weights, flat, lanes, terms)
                 _keep(flat, _OF_ROW * lanes, kept.rows, kept.row_errors, i)
-                if terms and kept.rows.shape[0] > 0:
-                    _shift(kept.rows, i, 3, off, 1.0)
                 i += 1
-            g = _compare_yaw_rates(
-                g, now, dt, stretch, inputs, kept, flat, lanes, _yaw_off(flat, shared) if terms else 0.0
-            )
+            g = _compare_yaw_rates(g, now, dt, stretch, inputs, kept, flat, lanes, physics, reads)
             while j < inputs.pose_t.shape[0] and (inputs.pose_t[j] - late) * stretch <= now + 1e-9:
                 back = max(now - (inputs.pose_t[j] - late) * stretch, 0.0) if n > 0 else 0.0
-                if terms:
-                    _pose_off(flat, shared, off)
-                    _shift(inputs.pose, j, 3, off, -1.0)
-                _compare_pose(j, back, max(inputs.pose_t[j] - before, 0.0), inputs, flat, lanes)
+                if reads:
+                    _set_off_of_pose(flat, lanes, physics)
+                _compare_pose(j, back, max(inputs.pose_t[j] - before, 0.0), inputs, flat, lanes, terms)
                 _keep(flat, _OF_POSE * lanes, kept.poses, kept.pose_errors, j)
-                if terms and kept.poses.shape[0] > 0:
-                    _shift(kept.poses, j, 3, off, 1.0)
                 before = inputs.pose_t[j]
                 j += 1
             if (g == inputs.t.shape[0] and j == inputs.pose_t.shape[0]) or n >= MOST_STEPS:
@@ -376,8 +409,8 @@ def _replay_kernel(lanes: int, terms: bool = False) -> Any:  # noqa: C901
             left = _held(inputs.commands, inputs.command_t, 0, at, begin, end, cap) * share
             right = _held(inputs.commands, inputs.command_t, 1, at, begin, end, cap) * share
             _remember_yaw(flat, lanes)
-            if terms:
-                _advance_with_terms(left, right, inputs.bench, shared, stores[0], flat)
+            if acts:
+                _advance_with_terms(left, right, inputs.bench, physics, alike, stores, flat, lanes)
             else:
                 _advance(left, right, inputs.bench, flat, lanes)
             n += 1
@@ -385,8 +418,8 @@ def _replay_kernel(lanes: int, terms: bool = False) -> Any:  # noqa: C901
     return kernel(replay)
 
 
-_replay_one, _replay_lanes, _replay_with_terms = (
-    _replay_kernel(1), _replay_kernel(LANES), _replay_kernel(1, terms=True)
+_replay_one, _replay_lanes, _replay_lanes_with_terms = (
+    _replay_kernel(1, terms=True), _replay_kernel(LANES, terms=False), _replay_kernel(LANES, terms=True)
 )  # fmt: skip
 
 
@@ -400,7 +433,7 @@ def replay_rows(
     inputs
         The recording.
     physics
-        Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`, and of several none has terms.
+        Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`.
     start
         Start pose of the axle's centre [m, m, rad], shape (3,).
     offset
@@ -413,11 +446,9 @@ def replay_rows(
     lanes, n, m = len(physics), len(inputs.t), len(inputs.pose_t)
     shapes = (n * predictions, ROW_COLUMNS), (n, 4), (m * predictions, 3), (m, 3)
     kept = Kept(*(np.empty((rows, columns * lanes)) for rows, columns in shapes))
-    if lanes == 1 and has_terms(physics)[0]:
-        play = _replay_with_terms
-        inputs = inputs._replace(measured=inputs.measured.copy(), pose=inputs.pose.copy())
-    else:
-        play = _replay_one if lanes == 1 else _replay_lanes
-    flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(1, STORES)
-    play(inputs, np.ascontiguousarray(physics), start, offset, dt, flat, np.zeros(8), stores, kept)
+    several = _replay_lanes_with_terms if has_terms(physics).any() else _replay_lanes
+    play = _replay_one if lanes == 1 else several
+    alike = lanes > 1 and len(set(formulas_of(physics))) == 1
+    flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(N_STORES * lanes)
+    play(inputs, np.ascontiguousarray(physics), start, offset, dt, flat, np.zeros(4), stores, kept, alike)
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

@@ -17,9 +17,9 @@ _FILTER = "before_x before_y shift_x shift_y shift_heading xx xy xh yx yy yh hx 
 FILTER = np.dtype([(field, np.float64) for field in _FILTER.split()])
 """The last pose as corrected, how far this one has been moved, and the pose's covariance, row by row."""
 
-_POSE = "x_error y_error heading_error x y heading"
+_POSE = "x_error y_error heading_error x y heading x_off y_off heading_off"
 POSE = np.dtype([(field, np.float64) for field in _POSE.split()])
-"""Normalised residuals of a pose, and the pose predicted."""
+"""Normalised residuals of a pose, the pose predicted, and what terms add to it."""
 
 _UNKNOWN = 0.01  # the start pose is known to 0.1 m and 6 degrees: to nothing, beside what follows
 

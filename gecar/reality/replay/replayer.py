@@ -14,15 +14,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
 
+from gecar.compiled import LANES
 from gecar.reality.recordings.camera_frame import axle_pose
 from gecar.reality.recordings.encoder_zero import LATEST_FIRST_ROW_S
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_input import KernelInput
 from gecar.reality.replay.rigid_alignment import moved_start
-from gecar.world.kernel.lock_step import LANES
+from gecar.world.kernel.dynamics import has_terms
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
+from gecar.world.terms import formulas_of, ports_of
 
 Array = npt.NDArray[np.float64]
 DEG = np.pi / 180.0
@@ -171,7 +173,7 @@ class Replayer:
             missed = numbers[~_enters(found.rows, physics[numbers])]
             out[missed] = np.r_[found.row_errors.T.ravel(), found.pose_errors.T.ravel()]
             left[missed] = False
-        for some in _in_step(physics, np.flatnonzero(left)):
+        for some in _in_step(physics, np.flatnonzero(left), self.inputs.bench):
             robots = physics[np.resize(some, LANES if len(some) > 1 else 1)]
             kept = replay_rows(self.inputs, robots, self.start, self.clock_offset_s, STEP_S, False)
             for lane, number in enumerate(some):
@@ -273,22 +275,26 @@ def _enters(rows: Array, physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     return np.asarray(nearest < physics["patch_radius"] + between)
 
 
-def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_]) -> Iterator[list[int]]:
-    """Yield which of some records to replay together: up to `LANES` that share `TIMING`.
+def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_], bench: bool) -> Iterator[list[int]]:
+    """Yield which of some records to replay together: up to `LANES` that share `TIMING` and where their terms act.
 
-    Few are replayed one by one, and so are those with terms.
+    Those whose laws differ in constants alone stand side by side. Few are replayed one by one, and so are motors with
+    laws.
     """
-    alike: dict[Any, list[int]] = {}
-    keys = physics[numbers][list(TIMING)].tolist()
-    for number, key in zip(numbers.tolist(), keys, strict=True):
-        if physics["n_terms"][number] > 0.0:
-            yield [number]
-        else:
-            alike.setdefault(key, []).append(number)
-    for shared in alike.values():
+    robots = physics[numbers]
+    keys: list[Any] = robots[list(TIMING)].tolist()
+    laws = [b""] * len(robots)
+    if has_terms(robots).any():
+        keys = list(zip(keys, ports_of(robots), strict=True))
+        laws = formulas_of(robots)
+    together: dict[Any, list[int]] = {}
+    for k in sorted(range(len(robots)), key=laws.__getitem__):
+        together.setdefault(keys[k], []).append(int(numbers[k]))
+    for shared in together.values():
+        apart = bench and physics["n_terms"][shared[0]] > 0.0
         for first in range(0, len(shared), LANES):
             some = shared[first : first + LANES]
-            yield from [some] if len(some) >= FEWEST_LANES else [[number] for number in some]
+            yield from [[number] for number in some] if apart or len(some) < FEWEST_LANES else [some]
 
 
 def _first_pose(pose: Array) -> Array:

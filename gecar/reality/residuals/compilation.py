@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gecar.compiled import CACHE, is_cold, mark_warm
+from gecar.compiled import CACHE, LANES, is_cold, mark_warm
 from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.recordings.recording import make_recording
@@ -23,7 +23,6 @@ from gecar.reality.replay.replayer import USUAL_NOISE, USUAL_WALK
 from gecar.reality.residuals.nuisances import Nuisances, SensorPath
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.world.course.course import load_course
-from gecar.world.kernel.lock_step import LANES
 from gecar.world.robot import Robot, load_robot
 from gecar.world.terms import Term
 
@@ -72,7 +71,7 @@ def _in_lock_step(run: RecordingResiduals, robot: Robot) -> None:
 
 
 def _with_laws(run: RecordingResiduals, robot: Robot) -> None:
-    run.replayer.play(robot.with_terms([LAW]).physics)
+    run.motion_errors(np.repeat(robot.with_terms([LAW]).physics, LANES))
 
 
 def _readings(run: RecordingResiduals, robot: Robot) -> None:

@@ -38,7 +38,7 @@ class Setup(NamedTuple):
     commands
         Commands remembered for the actuation delay, shape (2 RING,).
     stores
-        Of the robot's terms, dtype `STORES`, shape (1,).
+        Of the robot's terms, shape (`gecar.world.kernel.laws.N_STORES`,).
     engine
         pymunk's, or `NO_ENGINE`.
     energy
@@ -56,7 +56,7 @@ class Setup(NamedTuple):
     control: npt.NDArray[Any]
     eyes: npt.NDArray[Any]
     commands: npt.NDArray[np.float64]
-    stores: npt.NDArray[Any]
+    stores: npt.NDArray[np.float64]
     engine: EngineArrays
     energy: npt.NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def advance_with_terms(
 ) -> None:
     """Do the same for a robot with terms."""
     left, right = _acting(n, left_duty, right_duty, p, c, setup.commands)
-    step_with_terms(s, left, right, p, c, setup.stores[0])
+    step_with_terms(s, left, right, setup.physics, c, setup.stores)
     _move(s, c, setup.engine)
 
 

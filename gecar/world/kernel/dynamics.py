@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from gecar.compiled import blank, kernel
 from gecar.world.kernel.contacts import release_contacts, sweep
+from gecar.world.kernel.laws import SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.motor import (
     awake,
     battery_current,
@@ -31,7 +32,7 @@ from gecar.world.kernel.motor import (
 )
 from gecar.world.kernel.series import small_cosine, small_sine
 from gecar.world.kernel.state import roll_on
-from gecar.world.kernel.terms import ASKED, ask
+from gecar.world.kernel.terms import ask, look_at
 
 STILL = 1e-15  # m/s and rad/s
 
@@ -98,7 +99,7 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
     bool
         Whether another sweep would change nothing.
     """
-    _enter_step(s, c, effects)
+    enter_step(s, c, effects)
     s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
     _run_motors(s, left_duty, right_duty, p, c, effects)
     _set_budgets(s, p, c, effects)
@@ -107,68 +108,112 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
 
 
 @kernel
-def step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, stores: Any) -> None:
+def step_with_terms(
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    robot: npt.NDArray[Any],
+    c: Any,
+    stores: npt.NDArray[np.float64],
+) -> None:
     """Advance a robot with terms by one step, as `step` does; what they ask for enters at the ports.
 
     Parameters
     ----------
     s, left_duty, right_duty
         As in `step`.
-    p
-        Record of dtype `PHYSICS` with the terms.
+    robot
+        Its physics with the terms, dtype `PHYSICS`, shape (1,).
     c
         Record of dtype `DERIVED`; terms may change the robot's shape in it.
     stores
-        Record of dtype `gecar.world.kernel.terms.STORES`, updated.
+        What terms have stored, shape (`gecar.world.kernel.laws.N_STORES`,), updated.
     """
-    asked = blank(ASKED)
-    _enter_step(s, c, True)
-    ask(s, left_duty, right_duty, p, c, stores, asked)
+    p = robot[0]
+    enter_step(s, c, True)
+    scratch = blank(SCRATCH).of
+    _ask(s, left_duty, right_duty, robot, c, stores, scratch)
+    asked = load_asked(scratch, 1, 0)
     if asked.shape_terms > 0.0:
-        _reshape(p, asked, c)
-    _force(s, asked, c)
-    s.voltage = supply(s, p) + asked.supply_voltage
-    _run_motors(s, left_duty + asked.left_command, right_duty + asked.right_command, p, c, True)
-    s.left_speed += asked.left_torque * c.dt * c.inv_rotor
-    s.right_speed += asked.right_torque * c.dt * c.inv_rotor
-    _set_budgets(s, p, c, True)
-    s.left_dry = max(s.left_dry + asked.left_friction * c.dt, 0.0)
-    s.right_dry = max(s.right_dry + asked.right_friction * c.dt, 0.0)
-    grip = _grip(s, p) * c.dt
-    s.left_circle = max(s.left_circle + grip * asked.left_load, 0.0) * max(1.0 + asked.left_grip, 0.0)
-    s.right_circle = max(s.right_circle + grip * asked.right_load, 0.0) * max(1.0 + asked.right_grip, 0.0)
-    s.caster_circle = max(s.caster_circle + asked.caster * _caster_load(s, c) * c.dt, 0.0)
-    release_contacts(s)
-    if not sweep(s, c, True) and not sweep(s, c, True):
+        reshape(p, asked, c)
+    if not begin_as_asked(s, left_duty, right_duty, p, c, asked) and not sweep(s, c, True):
         sweep(s, c, True)
     end_step(s, p, c, True)
 
 
 @kernel
-def bench_step_with_terms(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, stores: Any) -> None:
-    """Advance the shafts of a robot with terms on a bench, as `gecar.world.kernel.motor.bench_step` does."""
-    asked = blank(ASKED)
-    ask(s, left_duty, right_duty, p, c, stores, asked)
+def _ask(
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    robot: npt.NDArray[Any],
+    c: Any,
+    stores: npt.NDArray[np.float64],
+    scratch: npt.NDArray[np.float64],
+) -> None:
+    """Set what the terms of one robot, shape (1,), ask for; ``scratch`` as in `gecar.world.kernel.terms.ask`."""
+    v = blank(VIEW)
+    look_at(s, left_duty, right_duty, robot[0], c, v)
+    store_view(scratch, 1, 0, v)
+    ask(robot, False, c.dt, stores, scratch, 1)
+
+
+@kernel
+def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, asked: Any) -> bool:
+    """Begin a step that was entered, as `begin_step` does, with what terms ask for, but for the robot's shape."""
+    _force(s, asked, c)
     s.voltage = supply(s, p) + asked.supply_voltage
+    _run_motors(s, left_duty + asked.left_command, right_duty + asked.right_command, p, c, True)
+    s.left_speed += asked.left_motor_torque * c.dt * c.inv_rotor
+    s.right_speed += asked.right_motor_torque * c.dt * c.inv_rotor
+    _set_budgets(s, p, c, True)
+    s.left_dry = max(s.left_dry + asked.left_gear_friction * c.dt, 0.0)
+    s.right_dry = max(s.right_dry + asked.right_gear_friction * c.dt, 0.0)
+    grip = _grip(s, p) * c.dt
+    s.left_circle = max(s.left_circle + grip * asked.left_wheel_load, 0.0) * max(
+        1.0 + asked.left_tyre_grip, 0.0
+    )
+    s.right_circle = max(s.right_circle + grip * asked.right_wheel_load, 0.0) * max(
+        1.0 + asked.right_tyre_grip, 0.0
+    )
+    s.caster_circle = max(s.caster_circle + asked.caster_friction * _caster_load(s, c) * c.dt, 0.0)
+    release_contacts(s)
+    return sweep(s, c, True)
+
+
+@kernel
+def bench_step_with_terms(
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    robot: npt.NDArray[Any],
+    c: Any,
+    stores: npt.NDArray[np.float64],
+) -> None:
+    """Advance the shafts of a robot with terms on a bench, as `gecar.world.kernel.motor.bench_step` does."""
+    scratch = blank(SCRATCH).of
+    _ask(s, left_duty, right_duty, robot, c, stores, scratch)
+    asked = load_asked(scratch, 1, 0)
+    s.voltage = supply(s, robot[0]) + asked.supply_voltage
     turn_bare_shafts(
         s,
         left_duty + asked.left_command,
         right_duty + asked.right_command,
-        asked.left_torque,
-        asked.right_torque,
-        asked.left_friction,
-        asked.right_friction,
-        p,
+        asked.left_motor_torque,
+        asked.right_motor_torque,
+        asked.left_gear_friction,
+        asked.right_gear_friction,
+        robot[0],
         c,
     )
 
 
 @kernel
-def _reshape(p: Any, asked: Any, c: Any) -> None:
+def reshape(p: Any, asked: Any, c: Any) -> None:
     """Let the radii, the track and the play be what terms make of them in a step."""
-    roll_on(p, asked.left_radius, asked.right_radius, asked.track, c)
-    c.left_gap = 0.5 * max(p.backlash + asked.left_play, 0.0)
-    c.right_gap = 0.5 * max(p.backlash + asked.right_play, 0.0)
+    roll_on(p, asked.left_rolling_radius, asked.right_rolling_radius, asked.track_width, c)
+    c.left_gap = 0.5 * max(p.backlash + asked.left_gear_play, 0.0)
+    c.right_gap = 0.5 * max(p.backlash + asked.right_gear_play, 0.0)
 
 
 @kernel
@@ -182,7 +227,7 @@ def _force(s: Any, asked: Any, c: Any) -> None:
 
 
 @kernel
-def _enter_step(s: Any, c: Any, effects: bool) -> None:
+def enter_step(s: Any, c: Any, effects: bool) -> None:
     """Set the velocities ahead and to the left, along the heading at mid-step: the path is then second order in it."""
     s.half_turn = 0.5 * c.dt * s.yaw_rate
     turn(s, s.half_turn)

@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import kernel, lane_access
+from gecar.compiled import LANES, kernel, lane_access
 from gecar.world.kernel.conditions import Conditions
 from gecar.world.kernel.drive import OUT_OF_TIME, RUNNING, STUCK, begin_program, enter_tile
 from gecar.world.kernel.eyes import EYES, Floor, look
 from gecar.world.kernel.interpreter import CONTROL, run_program
 from gecar.world.kernel.lock_step import (
-    LANES,
     N_FIELDS,
     advance_lanes,
     lane_memory,

@@ -1,7 +1,6 @@
-"""Terms: laws in a robot's record, worked out step by step and handed to the ports.
+"""Terms: laws in a robot's record, worked out step by step (`gecar.world.kernel.laws`) and handed to the ports.
 
-A law is a postfix program over variables and constants, run on six values without a loop over memory; whatever it says,
-the result is a finite number (`_total`). A term's store is a first-order low pass of a law of its own.
+A term's store is a first-order low pass of a law of its own.
 """
 
 from __future__ import annotations
@@ -10,178 +9,68 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gecar.compiled import blank, kernel, subroutine
+from gecar.world.kernel.laws import (
+    ASKED_FIELDS,
+    ASKED_OF_PORT,
+    AT_ASKED,
+    AT_KEPT,
+    AT_VALUES,
+    MEAN,
+    OF_BODY,
+    SCRATCH,
+    VIEW,
+    law,
+    store_view,
+    work_out,
+)
 from gecar.world.kernel.motor import motor_current
 from gecar.world.ports import (
+    AT_A_POINT,
     AT_X,
     AT_Y,
     BOTH,
-    CONSTANTS,
-    FIRST_OPERATOR,
-    FIRST_VARIABLE,
     LAW,
     LENGTH,
     N_TERMS,
     OF_ITSELF,
-    OF_TWO,
-    OPERATOR,
     PORT,
     PORT_NUMBER,
+    RIGHT,
     SIDE,
     STORE_LAW,
     STORE_LENGTH,
     STORE_S,
     VARIABLE,
-    VARIABLES,
 )
 
-VIEW = np.dtype([("of", np.float64, (2, len(VARIABLES)))])
-"""What laws see: every variable, of the left wheel and of the right one."""
+Array = npt.NDArray[np.float64]
 
-STORES = np.dtype([("of", np.float64, (2, N_TERMS)), ("supply_voltage", np.float64)])
-"""What each term has stored, of either wheel; and what terms asked of the battery in the last step [V]."""
-
-_ASKED = (
-    "left_command right_command supply_voltage left_torque right_torque left_friction right_friction "
-    "left_radius right_radius left_load right_load left_grip right_grip "
-    "force_ahead force_aside force_x force_y yaw_moment left_play right_play track caster shape_terms"
-)
-ASKED = np.dtype([(field, np.float64) for field in _ASKED.split()])
-"""What terms ask for at the ports of the dynamics in a step."""
-
-_LARGEST = 1e6
-_LEAST_DIVISOR = 1e-9
-_LARGEST_EXPONENT = 50.0
 _APART = 0.01  # rad, over which a radius's growth with the wheel's angle is measured
-_TIME, _COMMAND, _VOLTAGE, _CURRENT, _ANGLE, _SPEED, _LOAD, _SLIP, _OTHER_ANGLE, _OTHER_SPEED, _OF_SIDE = (
-    range(11)
+_ANGLE, _LOAD, _X, _Y = (VARIABLE[name] for name in ("angle", "load", "x", "y"))
+_DISTANCE, _STORE = VARIABLE["distance"], VARIABLE["store"]
+
+PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING = (
+    PORT_NUMBER[name] for name in ("encoder_reading", "gyro_reading", "pose_x", "pose_y", "pose_heading")
 )
-_AHEAD, _ASIDE, _TURN_RATE, _X, _Y, _HEADING, _DISTANCE, _READING, _STORE, _DRAW = range(11, 21)
-assert VARIABLE["draw"] == _DRAW
-
-_PORT_COMMAND, _PORT_SUPPLY, _PORT_TORQUE, _PORT_FRICTION, _PORT_RADIUS, _PORT_LOAD, _PORT_GRIP = range(7)
-_PORT_FORCE_AHEAD, _PORT_FORCE_ASIDE, _PORT_FORCE_X, _PORT_FORCE_Y, _PORT_TOWARD, _PORT_YAW = range(7, 13)
-_PORT_PLAY, _PORT_TRACK, _PORT_CASTER = 13, 14, 15
-PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING, _PORT_COLOUR = range(16, 22)
-_PORT_POSE_TOWARD, _PORT_SENSOR_AHEAD, _PORT_SENSOR_ASIDE, _PORT_POSE_TURN = range(22, 26)
-assert PORT_NUMBER["pose_turn"] == _PORT_POSE_TURN
-
-_MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
-_PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
-_NEGATIVE, _ABS, _SIGN, _SQUARE = (OPERATOR[name] for name in ("negative", "abs", "sign", "square"))
-_SQRT, _EXP, _SIN, _COS = (OPERATOR[name] for name in ("sqrt", "exp", "sin", "cos"))
-_TANH, _RAMP = OPERATOR["tanh"], OPERATOR["ramp"]
-_LAST_OF_TWO = FIRST_OPERATOR + OF_TWO
+_COLOUR, _SENSOR_AHEAD, _SENSOR_ASIDE = (
+    PORT_NUMBER[name] for name in ("colour_reading", "sensor_ahead", "sensor_aside")
+)
+_TOWARD, _POSE_TOWARD, _POSE_TURN = (PORT_NUMBER[name] for name in AT_A_POINT)
+_RADIUS, _PLAY, _TRACK = (PORT_NUMBER[name] for name in ("rolling_radius", "gear_play", "track_width"))
+_ASKED_AT = np.array([ASKED_FIELDS.index(names[0]) for names in ASKED_OF_PORT])
+_OF_WHEEL = np.array([port.of_wheel for port in OF_BODY])
+_TORQUE, _FORCE_X, _FORCE_Y, _SUPPLY, _SHAPE = (
+    ASKED_FIELDS.index(name)
+    for name in ("left_motor_torque", "force_x", "force_y", "supply_voltage", "shape_terms")
+)
 
 
 @kernel
-def _total(value: float) -> float:
-    """Return a finite number, whatever was worked out."""
-    if math.isnan(value):
-        return 0.0
-    return min(max(value, -_LARGEST), _LARGEST)
-
-
-@kernel
-def _of_two(code: int, a: float, b: float) -> float:
-    if code == _PLUS:
-        return a + b
-    if code == _MINUS:
-        return a - b
-    if code == _TIMES:
-        return a * b
-    if code == _OVER:
-        return a / (b if abs(b) > _LEAST_DIVISOR else math.copysign(_LEAST_DIVISOR, b))
-    return min(a, b) if code == _MIN else max(a, b)
-
-
-@kernel
-def _of_one(code: int, a: float) -> float:  # noqa: C901, PLR0911
-    if code == _NEGATIVE:
-        return -a
-    if code == _ABS:
-        return abs(a)
-    if code == _SIGN:
-        return 1.0 if a > 0.0 else -1.0 if a < 0.0 else 0.0
-    if code == _SQUARE:
-        return a * a
-    if code == _SQRT:
-        return math.sqrt(abs(a))
-    if code == _EXP:
-        return math.exp(min(a, _LARGEST_EXPONENT))
-    if code == _SIN:
-        return math.sin(a)
-    if code == _COS:
-        return math.cos(a)
-    if code == _TANH:
-        return math.tanh(a)
-    if code == _RAMP:
-        return max(a, 0.0)
-    return 1.0 if a > 0.0 else 0.0
-
-
-@subroutine
-def _law(laws: Any, k: int, first: int, length: int, v: Any, hand: int) -> float:
-    """Return what a law gives for one wheel; hand 2 stands for the mean of both wheels' variables."""
-    a = b = d = e = f = g = 0.0  # the stack, its top first
-    for at in range(first, first + length):
-        code = int(laws.terms[k, at])
-        if code < FIRST_OPERATOR:
-            a, b, d, e, f, g = _value(laws, k, code, v, hand), a, b, d, e, f
-        elif code < _LAST_OF_TWO:
-            a, b, d, e, f = _total(_of_two(code, b, a)), d, e, f, g
-        else:
-            a = _total(_of_one(code, a))
-    return _total(a)
-
-
-@kernel
-def _value(laws: Any, k: int, code: int, v: Any, hand: int) -> float:
-    if code < FIRST_VARIABLE:
-        return laws.terms[k, CONSTANTS + code]
-    number = code - FIRST_VARIABLE
-    if hand == 2:
-        return 0.5 * (v.of[0, number] + v.of[1, number])
-    return v.of[hand, number]
-
-
-@kernel
-def _look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v: Any) -> None:
-    """Set what laws see in a step whose velocities in the body frame are known; loads and current are of the last."""
-    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
-    aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
-    wheel = 0.5 * (c.weight - min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight))
-    x, y = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
-    for hand in range(2):
-        v.of[hand, _TIME] = s.t
-        v.of[hand, _VOLTAGE] = s.voltage if s.t > 0.0 else p.voltage * p.supply_scale
-        v.of[hand, _AHEAD] = s.u
-        v.of[hand, _ASIDE] = s.w - s.yaw_rate * p.com_ahead
-        v.of[hand, _TURN_RATE] = s.yaw_rate
-        v.of[hand, _X] = x
-        v.of[hand, _Y] = y
-        v.of[hand, _HEADING] = s.heading
-        v.of[hand, _READING] = v.of[hand, _DISTANCE] = v.of[hand, _STORE] = 0.0
-    v.of[0, _COMMAND], v.of[1, _COMMAND] = left_command, right_command
-    v.of[0, _ANGLE] = v.of[1, _OTHER_ANGLE] = s.left_angle
-    v.of[1, _ANGLE] = v.of[0, _OTHER_ANGLE] = s.right_angle
-    v.of[0, _SPEED] = v.of[1, _OTHER_SPEED] = s.left_speed
-    v.of[1, _SPEED] = v.of[0, _OTHER_SPEED] = s.right_speed
-    v.of[0, _CURRENT] = motor_current(s.left_drive, s.voltage, s.left_speed, p)
-    v.of[1, _CURRENT] = motor_current(s.right_drive, s.voltage, s.right_speed, p)
-    draw = max(s.left_drive * v.of[0, _CURRENT], 0.0) + max(s.right_drive * v.of[1, _CURRENT], 0.0)
-    v.of[0, _DRAW] = v.of[1, _DRAW] = draw
-    v.of[0, _LOAD] = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
-    v.of[1, _LOAD] = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
-    v.of[0, _SLIP] = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
-    v.of[1, _SLIP] = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
-    v.of[0, _OF_SIDE], v.of[1, _OF_SIDE] = -1.0, 1.0
-
-
-@kernel
-def ask(s: Any, left_command: float, right_command: float, p: Any, c: Any, stores: Any, asked: Any) -> None:
-    """Set what a robot's terms ask for in a step, and let their stores fill.
+def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v: Any) -> None:
+    """Set what laws see in a step whose velocities in the body frame are known; loads and current are of the last.
 
     Parameters
     ----------
@@ -190,133 +79,158 @@ def ask(s: Any, left_command: float, right_command: float, p: Any, c: Any, store
     left_command, right_command
         Commands of the step [-1..1].
     p, c
-        Records of dtypes `PHYSICS`, the robot's own with its terms, and `DERIVED`.
-    stores, asked
-        Records of dtypes `STORES`, updated, and `ASKED`, overwritten.
+        Records of dtypes `PHYSICS` and `DERIVED`.
+    v
+        Record of dtype `VIEW`, overwritten.
     """
-    v = blank(VIEW)
-    _look_at(s, left_command, right_command, p, c, v)
-    _ask(p, c.dt, stores, v, asked)
-
-
-@subroutine
-def _ask(laws: Any, dt: float, stores: Any, v: Any, asked: Any) -> None:
-    """Work out all terms; what several ask for at a port adds up."""
-    asked.left_command = asked.right_command = asked.supply_voltage = 0.0
-    asked.left_torque = asked.right_torque = asked.left_friction = asked.right_friction = 0.0
-    asked.left_radius = asked.right_radius = asked.left_load = asked.right_load = 0.0
-    asked.left_grip = asked.right_grip = asked.force_ahead = asked.force_aside = 0.0
-    asked.force_x = asked.force_y = asked.yaw_moment = asked.track = asked.shape_terms = 0.0
-    asked.left_play = asked.right_play = asked.caster = 0.0
-    for k in range(int(laws.n_terms)):
-        port = int(laws.terms[k, PORT])
-        if port >= PORT_ENCODER:
-            continue
-        for hand in range(2):
-            v.of[hand, _STORE] = stores.of[hand, k]
-        if port == _PORT_TOWARD:
-            force_x, force_y = _toward(laws, k, v)
-            asked.force_x += force_x
-            asked.force_y += force_y
-        elif port in (
-            _PORT_SUPPLY,
-            _PORT_FORCE_AHEAD,
-            _PORT_FORCE_ASIDE,
-            _PORT_FORCE_X,
-            _PORT_FORCE_Y,
-            _PORT_YAW,
-            _PORT_TRACK,
-            _PORT_CASTER,
-        ):
-            _add_whole(asked, port, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2))
-        else:
-            for hand in range(2):
-                if int(laws.terms[k, SIDE]) in (BOTH, hand):
-                    _add_of_wheel(asked, port, hand, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand))
-                    if port == _PORT_RADIUS:
-                        _add_of_wheel(asked, _PORT_TORQUE, hand, _lift(laws, k, v, hand))
-        if laws.terms[k, STORE_LENGTH] > 0.0:
-            _fill(laws, k, dt, v, stores)
-    stores.supply_voltage = asked.supply_voltage
-
-
-@subroutine
-def _lift(laws: Any, k: int, v: Any, hand: int) -> float:
-    """Return the torque on a wheel's shaft as the wheel, which is not round, lifts or lowers the axle [N m].
-
-    By virtual work, load times what the radius grows by a radian: a term at ``rolling_radius`` gives a share of it.
-    """
-    angle, length = v.of[hand, _ANGLE], int(laws.terms[k, LENGTH])
-    v.of[hand, _ANGLE] = angle + _APART
-    after = _law(laws, k, LAW, length, v, hand)
-    v.of[hand, _ANGLE] = angle - _APART
-    before = _law(laws, k, LAW, length, v, hand)
-    v.of[hand, _ANGLE] = angle
-    radius = laws.wheel_radius * laws.radius_scale
-    return -v.of[hand, _LOAD] * radius * (after - before) / (2.0 * _APART)
+    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
+    aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
+    wheel = 0.5 * (c.weight - min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight))
+    v.left_time = v.right_time = s.t
+    v.left_voltage = v.right_voltage = s.voltage if s.t > 0.0 else p.voltage * p.supply_scale
+    v.left_ahead = v.right_ahead = s.u
+    v.left_aside = v.right_aside = s.w - s.yaw_rate * p.com_ahead
+    v.left_turn_rate = v.right_turn_rate = s.yaw_rate
+    v.left_x = v.right_x = s.x - p.com_ahead * s.cos
+    v.left_y = v.right_y = s.y - p.com_ahead * s.sin
+    v.left_heading = v.right_heading = s.heading
+    v.left_reading = v.right_reading = 0.0
+    v.left_distance = v.right_distance = v.left_store = v.right_store = 0.0
+    v.left_command, v.right_command = left_command, right_command
+    v.left_angle = v.right_other_angle = s.left_angle
+    v.right_angle = v.left_other_angle = s.right_angle
+    v.left_speed = v.right_other_speed = s.left_speed
+    v.right_speed = v.left_other_speed = s.right_speed
+    v.left_current = motor_current(s.left_drive, s.voltage, s.left_speed, p)
+    v.right_current = motor_current(s.right_drive, s.voltage, s.right_speed, p)
+    draw = max(s.left_drive * v.left_current, 0.0) + max(s.right_drive * v.right_current, 0.0)
+    v.left_draw = v.right_draw = draw
+    v.left_load = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
+    v.right_load = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
+    v.left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
+    v.right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
+    v.left_side, v.right_side = -1.0, 1.0
 
 
 @kernel
-def _fill(laws: Any, k: int, dt: float, v: Any, stores: Any) -> None:
+def ask(robots: npt.NDArray[Any], alike: bool, dt: float, stores: Array, scratch: Array, lanes: int) -> None:
+    """Set what terms ask for in a step, of robots whose terms act at the same ports, and let their stores fill.
+
+    Parameters
+    ----------
+    robots
+        With their terms, dtype `PHYSICS`, shape (lanes,).
+    alike
+        Whether their laws differ in constants alone: then all lanes go through a law together.
+    dt
+        Step [s].
+    stores
+        ``N_STORES`` fields of all lanes, updated.
+    scratch
+        ``N_SCRATCH`` fields of all lanes; what laws see is set, what they ask for is overwritten.
+    lanes
+        A constant where this is called.
+    """
+    scratch[AT_ASKED * lanes : AT_VALUES * lanes] = 0.0
+    first = robots[0]
+    for k in range(int(first.n_terms)):
+        port, side = int(first.terms[k, PORT]), int(first.terms[k, SIDE])
+        if port >= PORT_ENCODER:
+            continue
+        for each in range(2 * lanes):
+            scratch[2 * _STORE * lanes + each] = stores[2 * k * lanes + each]
+        hand = side if _OF_WHEEL[port] else MEAN
+        if port == _TOWARD:
+            _pull(robots, alike, k, scratch, lanes)
+        else:
+            work_out(robots, alike, k, LAW, LENGTH, hand, scratch, lanes)
+            _add(_ASKED_AT[port], hand, scratch, lanes)
+        if port == _RADIUS:
+            _lift(robots, alike, k, side, scratch, lanes)
+        if port in (_RADIUS, _PLAY, _TRACK):
+            scratch[(AT_ASKED + _SHAPE) * lanes : (AT_ASKED + _SHAPE + 1) * lanes] = 1.0
+        if first.terms[k, STORE_LENGTH] > 0.0:
+            _fill(robots, alike, k, dt, stores, scratch, lanes)
+    for lane in range(lanes):
+        stores[2 * N_TERMS * lanes + lane] = scratch[(AT_ASKED + _SUPPLY) * lanes + lane]
+
+
+@kernel
+def _add(field: int, hand: int, scratch: Array, lanes: int) -> None:
+    """Add a law's values to what is asked for: of both wheels (`BOTH`), of one, or of the body."""
+    at, values = (AT_ASKED + field) * lanes, AT_VALUES * lanes
+    if hand != RIGHT:
+        for lane in range(lanes):
+            scratch[at + lane] += scratch[values + lane]
+    if hand in (BOTH, RIGHT):
+        for lane in range(lanes):
+            scratch[at + lanes + lane] += scratch[values + lanes + lane]
+
+
+@kernel
+def _pull(robots: npt.NDArray[Any], alike: bool, k: int, scratch: Array, lanes: int) -> None:
+    """Add to the forces on the floor's axes what a law gives toward its point."""
+    for lane in range(lanes):
+        dx, dy = _way_to_point(robots[lane], k, scratch, lanes, lane)
+        distance = math.sqrt(dx * dx + dy * dy)
+        scratch[2 * _DISTANCE * lanes + lane] = scratch[(2 * _DISTANCE + 1) * lanes + lane] = distance
+    work_out(robots, alike, k, LAW, LENGTH, MEAN, scratch, lanes)
+    for lane in range(lanes):
+        dx, dy = _way_to_point(robots[lane], k, scratch, lanes, lane)
+        pull = scratch[AT_VALUES * lanes + lane] / max(scratch[2 * _DISTANCE * lanes + lane], 1e-6)
+        scratch[(AT_ASKED + _FORCE_X) * lanes + lane] += pull * dx
+        scratch[(AT_ASKED + _FORCE_Y) * lanes + lane] += pull * dy
+
+
+@kernel
+def _way_to_point(robot: Any, k: int, seen: Array, lanes: int, lane: int) -> tuple[float, float]:
+    """Return the way from the robot to a law's point, along x and y [m]."""
+    dx = robot.terms[k, AT_X] - seen[2 * _X * lanes + lane]
+    return dx, robot.terms[k, AT_Y] - seen[2 * _Y * lanes + lane]
+
+
+@kernel
+def _lift(robots: npt.NDArray[Any], alike: bool, k: int, side: int, scratch: Array, lanes: int) -> None:
+    """Add the torque on a wheel's shaft as the wheel, which is not round, lifts or lowers the axle [N m].
+
+    By virtual work, load times what the radius grows by a radian: a term at ``rolling_radius`` gives a share of it.
+    """
+    angle, load, values, kept = 2 * _ANGLE * lanes, 2 * _LOAD * lanes, AT_VALUES * lanes, AT_KEPT * lanes
+    for each in range(2 * lanes):
+        scratch[kept + each] = scratch[angle + each]
+        scratch[angle + each] += _APART
+    work_out(robots, alike, k, LAW, LENGTH, side, scratch, lanes)
+    for each in range(2 * lanes):
+        scratch[kept + 2 * lanes + each] = scratch[values + each]
+        scratch[angle + each] = scratch[kept + each] - _APART
+    work_out(robots, alike, k, LAW, LENGTH, side, scratch, lanes)
+    for lane in range(lanes):
+        radius = robots[lane].wheel_radius * robots[lane].radius_scale
+        for each in (lane, lanes + lane):
+            scratch[angle + each] = scratch[kept + each]
+            grown = scratch[kept + 2 * lanes + each] - scratch[values + each]
+            scratch[values + each] = -scratch[load + each] * radius * grown / (2.0 * _APART)
+    _add(_TORQUE, side, scratch, lanes)
+
+
+@kernel
+def _fill(
+    robots: npt.NDArray[Any], alike: bool, k: int, dt: float, stores: Array, scratch: Array, lanes: int
+) -> None:
     """Let a term's store fill for a step.
 
     It is exact where what the store fills toward stands still, or, of one that looks at itself, where its change does.
     """
-    keep = math.exp(-dt / laws.terms[k, STORE_S])
-    if laws.terms[k, OF_ITSELF] > 0.0:
-        keep = max(1.0 - dt / laws.terms[k, STORE_S], 0.0)
-    for hand in range(2):
-        goal = _law(laws, k, STORE_LAW, int(laws.terms[k, STORE_LENGTH]), v, hand)
-        stores.of[hand, k] = goal + (stores.of[hand, k] - goal) * keep
-
-
-@kernel
-def _add_whole(asked: Any, port: int, value: float) -> None:
-    if port == _PORT_SUPPLY:
-        asked.supply_voltage += value
-    elif port == _PORT_FORCE_AHEAD:
-        asked.force_ahead += value
-    elif port == _PORT_FORCE_ASIDE:
-        asked.force_aside += value
-    elif port == _PORT_FORCE_X:
-        asked.force_x += value
-    elif port == _PORT_FORCE_Y:
-        asked.force_y += value
-    elif port == _PORT_YAW:
-        asked.yaw_moment += value
-    elif port == _PORT_CASTER:
-        asked.caster += value
-    else:
-        asked.shape_terms += 1.0
-        asked.track += value
-
-
-@kernel
-def _add_of_wheel(asked: Any, port: int, hand: int, value: float) -> None:
-    left, right = (value, 0.0) if hand == 0 else (0.0, value)
-    if port == _PORT_COMMAND:
-        asked.left_command += left
-        asked.right_command += right
-    elif port == _PORT_TORQUE:
-        asked.left_torque += left
-        asked.right_torque += right
-    elif port == _PORT_FRICTION:
-        asked.left_friction += left
-        asked.right_friction += right
-    elif port == _PORT_RADIUS:
-        asked.shape_terms += 1.0
-        asked.left_radius += left
-        asked.right_radius += right
-    elif port == _PORT_LOAD:
-        asked.left_load += left
-        asked.right_load += right
-    elif port == _PORT_PLAY:
-        asked.shape_terms += 1.0
-        asked.left_play += left
-        asked.right_play += right
-    else:
-        asked.left_grip += left
-        asked.right_grip += right
+    work_out(robots, alike, k, STORE_LAW, STORE_LENGTH, BOTH, scratch, lanes)
+    for lane in range(lanes):
+        robot = robots[lane]
+        keep = math.exp(-dt / robot.terms[k, STORE_S])
+        if robot.terms[k, OF_ITSELF] > 0.0:
+            keep = max(1.0 - dt / robot.terms[k, STORE_S], 0.0)
+        for each in (lane, lanes + lane):
+            goal = scratch[AT_VALUES * lanes + each]
+            at = 2 * k * lanes + each
+            stores[at] = goal + (stores[at] - goal) * keep
 
 
 @kernel
@@ -335,14 +249,16 @@ def reading_error(port: int, hand: int, s: Any, p: Any, laws: Any) -> float:
         Record of dtype `PHYSICS` with the terms.
     """
     v = blank(VIEW)
-    for each in range(2):
-        v.of[each, _TIME], v.of[each, _HEADING], v.of[each, _TURN_RATE] = s.t, s.heading, s.yaw_rate
-        v.of[each, _X], v.of[each, _Y] = s.x - p.com_ahead * s.cos, s.y - p.com_ahead * s.sin
-        v.of[each, _AHEAD] = s.vx * s.cos + s.vy * s.sin
-        v.of[each, _ASIDE] = s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
-    v.of[0, _ANGLE], v.of[1, _ANGLE] = s.left_angle, s.right_angle
-    v.of[0, _SPEED], v.of[1, _SPEED] = s.left_speed, s.right_speed
-    v.of[0, _OF_SIDE], v.of[1, _OF_SIDE] = -1.0, 1.0
+    v.left_time = v.right_time = s.t
+    v.left_heading = v.right_heading = s.heading
+    v.left_turn_rate = v.right_turn_rate = s.yaw_rate
+    v.left_x = v.right_x = s.x - p.com_ahead * s.cos
+    v.left_y = v.right_y = s.y - p.com_ahead * s.sin
+    v.left_ahead = v.right_ahead = s.vx * s.cos + s.vy * s.sin
+    v.left_aside = v.right_aside = s.vy * s.cos - s.vx * s.sin - s.yaw_rate * p.com_ahead
+    v.left_angle, v.right_angle = s.left_angle, s.right_angle
+    v.left_speed, v.right_speed = s.left_speed, s.right_speed
+    v.left_side, v.right_side = -1.0, 1.0
     return _reading_error(port, hand, v, laws)
 
 
@@ -360,10 +276,9 @@ def colour_error(time: float, x: float, y: float, heading: float, reading: float
         Record of dtype `PHYSICS` with the terms.
     """
     v = blank(VIEW)
-    for each in range(2):
-        v.of[each, _TIME], v.of[each, _X], v.of[each, _Y], v.of[each, _HEADING] = time, x, y, heading
-        v.of[each, _READING] = reading
-    return _reading_error(_PORT_COLOUR, 0, v, laws)
+    _stand(v, time, x, y, heading)
+    v.left_reading = v.right_reading = reading
+    return _reading_error(_COLOUR, 0, v, laws)
 
 
 @kernel
@@ -382,46 +297,58 @@ def sensor_shift(
         Record of dtype `PHYSICS` with the terms.
     """
     v = blank(VIEW)
-    for each in range(2):
-        v.of[each, _TIME], v.of[each, _X], v.of[each, _Y], v.of[each, _HEADING] = time, x, y, heading
-        v.of[each, _AHEAD], v.of[each, _ASIDE], v.of[each, _TURN_RATE] = ahead, aside, turn_rate
-    return _reading_error(_PORT_SENSOR_AHEAD, 0, v, laws), _reading_error(_PORT_SENSOR_ASIDE, 0, v, laws)
+    _stand(v, time, x, y, heading)
+    v.left_ahead = v.right_ahead = ahead
+    v.left_aside = v.right_aside = aside
+    v.left_turn_rate = v.right_turn_rate = turn_rate
+    return _reading_error(_SENSOR_AHEAD, 0, v, laws), _reading_error(_SENSOR_ASIDE, 0, v, laws)
+
+
+@kernel
+def _stand(v: Any, time: float, x: float, y: float, heading: float) -> None:
+    """Set when [s] and where [m, m, rad] laws see the robot."""
+    v.left_time = v.right_time = time
+    v.left_x = v.right_x = x
+    v.left_y = v.right_y = y
+    v.left_heading = v.right_heading = heading
 
 
 @subroutine
 def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
+    seen = blank(SCRATCH).of
+    store_view(seen, 1, 0, v)
     total, axis = 0.0, port - PORT_POSE_X
     for k in range(int(laws.n_terms)):
         of_wheel = port == PORT_ENCODER
         acts_at, side = int(laws.terms[k, PORT]), int(laws.terms[k, SIDE])
         if acts_at == port and (not of_wheel or side in (BOTH, hand)):
-            total += _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, hand if of_wheel else 2)
-        elif acts_at == _PORT_POSE_TOWARD and 0 <= axis < 2:
-            total += _toward(laws, k, v)[axis]
-        elif acts_at == _PORT_POSE_TURN and 0 <= axis < 3:
-            total += _turned(laws, k, v)[axis]
+            total += law(laws, k, LAW, int(laws.terms[k, LENGTH]), seen, 1, 0, hand if of_wheel else MEAN)
+        elif acts_at == _POSE_TOWARD and 0 <= axis < 2:
+            total += _toward(laws, k, seen)[axis]
+        elif acts_at == _POSE_TURN and 0 <= axis < 3:
+            total += _turned(laws, k, seen)[axis]
     return total
 
 
 @kernel
-def _toward(laws: Any, k: int, v: Any) -> tuple[float, float]:
+def _toward(laws: Any, k: int, seen: Array) -> tuple[float, float]:
     """Return along x and y what a law gives toward its point."""
-    dx, dy, value = _at_a_point(laws, k, v)
-    pull = value / max(v.of[0, _DISTANCE], 1e-6)
+    dx, dy, value = _at_a_point(laws, k, seen)
+    pull = value / max(seen[2 * _DISTANCE], 1e-6)
     return pull * dx, pull * dy
 
 
 @kernel
-def _turned(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
+def _turned(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
     """Return how far a pose seems to move when the camera's picture turns about a point: x, y [m] and heading [rad]."""
-    dx, dy, turn = _at_a_point(laws, k, v)
+    dx, dy, turn = _at_a_point(laws, k, seen)
     sine, less = math.sin(turn), math.cos(turn) - 1.0
     return sine * dy - less * dx, -sine * dx - less * dy, turn
 
 
 @kernel
-def _at_a_point(laws: Any, k: int, v: Any) -> tuple[float, float, float]:
+def _at_a_point(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
     """Return the way from the robot to a law's point, along x and y [m], and what the law gives at that distance."""
-    dx, dy = laws.terms[k, AT_X] - v.of[0, _X], laws.terms[k, AT_Y] - v.of[0, _Y]
-    v.of[0, _DISTANCE] = v.of[1, _DISTANCE] = math.sqrt(dx * dx + dy * dy)
-    return dx, dy, _law(laws, k, LAW, int(laws.terms[k, LENGTH]), v, 2)
+    dx, dy = _way_to_point(laws, k, seen, 1, 0)
+    seen[2 * _DISTANCE] = seen[2 * _DISTANCE + 1] = math.sqrt(dx * dx + dy * dy)
+    return dx, dy, law(laws, k, LAW, int(laws.terms[k, LENGTH]), seen, 1, 0, MEAN)
