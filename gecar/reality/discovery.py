@@ -76,7 +76,7 @@ Spans = Mapping[str, Mapping[str, Interval]]
 
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
-INSTEAD = 0.7  # of what effects and laws beside them leave: laws in their place must leave less
+INSTEAD = 0.7  # laws in the place of effects must leave so much less, or explain so much more, than laws beside them
 
 
 @dataclass(frozen=True)
@@ -359,19 +359,35 @@ def _explain_sensor(
 def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     """Add laws that explain what a stage's effects do not, where laws are wanted.
 
-    Effects may imitate what no list holds: where they leave something material even with laws beside them, laws are
-    written in their place, too, and taken if they leave far less.
+    Effects may imitate what no list holds: unless they have one size in all recordings, and leave nothing beside laws,
+    laws are written in their place, too, and taken if they leave far less, or no more and explain far more.
     """
     if context.language is None or not (stage.explained.unexplained or context.invents):
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
-    if not stage.explained.steps or _left(beside) < 1.0:
+    if not stage.explained.steps or _left(beside) < 1.0 or _stands(beside):
         return beside
     context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
     problem = stage.explained.problem
     bare = concluded(problem, problem.known, (), stage.explained.tried)
     alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
-    return alone if _left(alone) < INSTEAD * _left(beside) else beside
+    gains = [_gain(bare, each) for each in (beside, alone)]
+    far_less = _left(alone) < INSTEAD * _left(beside)
+    far_more = _left(alone) <= _left(beside) and gains[0] < INSTEAD * gains[1]
+    return alone if far_less or far_more else beside
+
+
+def _stands(stage: _Stage) -> bool:
+    """Whether a stage leaves nothing unexplained, and each of its effects has one size in all recordings."""
+    explained = stage.explained
+    return not explained.unexplained and all(stands_out(explained.problem, step) for step in explained.steps)
+
+
+def _gain(bare: Explanation, stage: _Stage) -> float:
+    """Return what a stage's robot gains in log-likelihood over a bare explanation's, beside what that leaves."""
+    residuals, estimator = bare.problem.residuals, bare.problem.estimator
+    before, after = (estimator.cost_of(residuals.errors(e.taken.physics)) for e in (bare, stage.explained))
+    return before - after
 
 
 def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained: Explanation) -> _Stage:
