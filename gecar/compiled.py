@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
@@ -114,6 +114,14 @@ def subroutine(function: F) -> F:
     njit: Any = numba.njit
     dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)
     return dispatcher
+
+
+def any_integer(value: int) -> int:
+    """Return an integer as kernels get it from a variable.
+
+    Numba compiles a kernel again for every Python integer that is written in a call of it, and once for all NumPy ones.
+    """
+    return cast("int", np.int64(value))
 
 
 def _on_stack(typing_context: Any, record: Any) -> Any:  # noqa: ARG001

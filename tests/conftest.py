@@ -35,7 +35,7 @@ def pytest_xdist_setupnodes() -> None:
     """Compile what takes longest before there are workers: else each of them compiles all of it at the same time."""
     if is_cold(compilation.REPLAYS):
         drives = subprocess.Popen([sys.executable, "-c", "import gecar.parallel.warm_up"])
-        replays = [compilation.compiling("one", "readings", "lanes"), compilation.compiling("laws")]
+        replays = [compilation.compiling("lanes", "readings", "laws"), compilation.compiling("one")]
         for child in (drives, *replays):
             child.wait()
         mark_warm(compilation.REPLAYS)

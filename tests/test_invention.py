@@ -262,10 +262,10 @@ def test_commands_that_act_late_are_written_as_such():
     assert law.parameters["store_s"].value == pytest.approx(0.07, rel=0.05)
 
 
-@pytest.mark.parametrize("without", [False, True], ids=["beside", "instead"])
-def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, without):
+@pytest.mark.parametrize("found", ["beside", "leaves less", "gains more"])
+def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, found):
     """The effect goes where the law is found beside it, and where it is found without the effect alone."""
-    if without:
+    if found != "beside":
         hidden_by_effects = discovery.invent
 
         def invent(explained, *args):
@@ -274,6 +274,8 @@ def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, withou
             )
 
         monkeypatch.setattr(discovery, "invent", invent)
+    if found == "gains more":
+        monkeypatch.setattr(discovery, "_left", lambda stage: 2.0)
     runs = tuple(recorded(robot_with(dict(LAG)), seed) for seed in range(5))
     catalogue = [effect for effect in CATALOGUE if effect.id in ("rotor_inertia", "pose_delay")]
     alone = discover(Case("lag", runs), catalogue=catalogue)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import LANES, kernel, lane_access
+from gecar.compiled import LANES, any_integer, kernel, lane_access
 from gecar.reality.replay.kernel_input import Kept, KernelInput
 from gecar.reality.replay.pose_filter import (
     FILTER,
@@ -30,7 +30,7 @@ from gecar.reality.replay.pose_filter import (
     predict_pose,
     rebase,
 )
-from gecar.world.kernel.dynamics import bench_step_with_terms, has_terms
+from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, step_with_terms
 from gecar.world.kernel.laws import N_STORES
 from gecar.world.kernel.lock_step import (
     N_FIELDS,
@@ -51,9 +51,8 @@ from gecar.world.kernel.state import derive, place
 from gecar.world.kernel.terms import (
     PORT_ENCODER,
     PORT_GYRO,
-    PORT_POSE_HEADING,
     PORT_POSE_X,
-    PORT_POSE_Y,
+    WHOLE,
     reading_error,
 )
 from gecar.world.ports import N_TERMS, PORT
@@ -65,6 +64,7 @@ Array = npt.NDArray[np.float64]
 LEFT_ANGLE, RIGHT_ANGLE, BATTERY, YAW_RATE, X, Y, HEADING, LEFT_SPEED, RIGHT_SPEED, AHEAD, ASIDE = range(11)
 ROW_COLUMNS = 11
 MOST_STEPS = 100_000_000
+_LEFT, _RIGHT, _ZERO = any_integer(0), any_integer(1), any_integer(0)
 
 TIMING = ("clock_skew", "actuation_delay", "pose_delay", "duty_cap")
 """What robots must share to be replayed in lock step, fields of the `PHYSICS` record."""
@@ -295,27 +295,42 @@ def _keep(flat: Array, first: int, predicted: Array, errors: Array, row: int) ->
 
 
 @kernel
-def _advance_with_terms(
+def _advance_one_with_terms(
     left: float,
     right: float,
     bench: bool,
     robots: npt.NDArray[Any],
+    alike: bool,  # noqa: ARG001 - of several
+    stores: Array,
+    flat: Array,
+) -> None:
+    """Do the same for one robot with terms."""
+    s, c = load_state(flat, 1, 0), load_derived(flat, 1, 0)
+    if bench:
+        bench_step_with_terms(s, left, right, robots, c, stores)
+    else:
+        step_with_terms(s, left, right, robots, c, stores)
+        drift(s, c)
+    store_state(flat, 1, 0, s)
+    store_derived(flat, 1, 0, c)
+
+
+@kernel
+def _advance_several_with_terms(
+    left: float,
+    right: float,
+    bench: bool,  # noqa: ARG001 - there, robots with terms are replayed one by one
+    robots: npt.NDArray[Any],
     alike: bool,
     stores: Array,
     flat: Array,
-    lanes: int,
 ) -> None:
-    """Do the same for robots with terms; on a bench for one alone."""
-    if bench:
-        s = load_state(flat, lanes, 0)
-        bench_step_with_terms(s, left, right, robots, load_derived(flat, lanes, 0), stores)
-        store_state(flat, lanes, 0, s)
-        return
-    for lane in range(lanes):
-        a = load_acting(flat, lanes, lane)
+    """Do the same for `LANES` robots with terms, on the floor."""
+    for lane in range(LANES):
+        a = load_acting(flat, LANES, lane)
         a.left, a.right = left, right
-        store_acting(flat, lanes, lane, a)
-    advance_lanes_with_terms(flat, lanes, robots, alike, stores)
+        store_acting(flat, LANES, lane, a)
+    advance_lanes_with_terms(flat, LANES, robots, alike, stores)
 
 
 @kernel
@@ -335,8 +350,8 @@ def _set_off_of_row(flat: Array, lanes: int, robots: npt.NDArray[Any], stores: A
         r.battery_off = stores[2 * N_TERMS * lanes + lane]
         if reads:
             s, p = load_state(flat, lanes, lane), robots[lane]
-            r.left_off = reading_error(PORT_ENCODER, 0, s, p, p)
-            r.right_off = reading_error(PORT_ENCODER, 1, s, p, p)
+            r.left_off = reading_error(PORT_ENCODER, _LEFT, s, p, p)
+            r.right_off = reading_error(PORT_ENCODER, _RIGHT, s, p, p)
         _store_row(flat, lanes, lane, r)
 
 
@@ -345,7 +360,7 @@ def _set_off_of_yaw_rate(flat: Array, lanes: int, robots: npt.NDArray[Any]) -> N
     """Set what terms add to a yaw rate."""
     for lane in range(lanes):
         r, p = _load_row(flat, lanes, lane), robots[lane]
-        r.yaw_off = reading_error(PORT_GYRO, 0, load_state(flat, lanes, lane), p, p)
+        r.yaw_off = reading_error(PORT_GYRO, WHOLE, load_state(flat, lanes, lane), p, p)
         _store_row(flat, lanes, lane, r)
 
 
@@ -354,9 +369,9 @@ def _set_off_of_pose(flat: Array, lanes: int, robots: npt.NDArray[Any]) -> None:
     """Set what terms add to a pose."""
     for lane in range(lanes):
         s, p, r = load_state(flat, lanes, lane), robots[lane], _load_pose(flat, lanes, lane)
-        r.x_off = reading_error(PORT_POSE_X, 0, s, p, p)
-        r.y_off = reading_error(PORT_POSE_Y, 0, s, p, p)
-        r.heading_off = reading_error(PORT_POSE_HEADING, 0, s, p, p)
+        r.x_off = reading_error(PORT_POSE_X, WHOLE, s, p, p)
+        r.y_off = reading_error(PORT_POSE_X + 1, WHOLE, s, p, p)
+        r.heading_off = reading_error(PORT_POSE_X + 2, WHOLE, s, p, p)
         _store_pose(flat, lanes, lane, r)
 
 
@@ -365,6 +380,7 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:
 
     Plain robots have no replay of their own: few are among those that are fitted, and it took 20 s to compile.
     """
+    advance_with_terms = _advance_one_with_terms if lanes == 1 else _advance_several_with_terms
 
     def replay(
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
@@ -376,8 +392,8 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:
         stretch = 1.0 / (1.0 + shared.clock_skew)
         late = shared.pose_delay + offset
         before = 0.0
-        i = j = g = n = 0
-        at = -1
+        i = j = g = n = _ZERO
+        at = _ZERO - 1
         acts = terms and shared.n_terms > 0.0
         reads = acts and _at_readings(shared)
         while True:
@@ -406,11 +422,11 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:
             while at + 1 < inputs.command_t.shape[0] and inputs.command_t[at + 1] <= begin:
                 at += 1
             share = stretch / dt
-            left = _held(inputs.commands, inputs.command_t, 0, at, begin, end, cap) * share
-            right = _held(inputs.commands, inputs.command_t, 1, at, begin, end, cap) * share
+            left = _held(inputs.commands, inputs.command_t, _LEFT, at, begin, end, cap) * share
+            right = _held(inputs.commands, inputs.command_t, _RIGHT, at, begin, end, cap) * share
             _remember_yaw(flat, lanes)
             if acts:
-                _advance_with_terms(left, right, inputs.bench, physics, alike, stores, flat, lanes)
+                advance_with_terms(left, right, inputs.bench, physics, alike, stores, flat)
             else:
                 _advance(left, right, inputs.bench, flat, lanes)
             n += 1

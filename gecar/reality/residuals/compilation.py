@@ -41,7 +41,7 @@ def compiled_replays(laws: bool, tell: Callable[[str], None]) -> Iterator[None]:
         yield
         return
     tell("compiling the simulation: this once, it takes about 20 s")
-    children = [compiling("lanes"), compiling("one", "readings")]
+    children = [compiling("lanes", "readings"), compiling("one")]
     try:
         for child in children:
             child.wait()

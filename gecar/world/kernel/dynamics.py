@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import blank, kernel
+from gecar.compiled import blank, kernel, subroutine
 from gecar.world.kernel.contacts import release_contacts, sweep
 from gecar.world.kernel.laws import SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.motor import (
@@ -141,7 +141,7 @@ def step_with_terms(
     end_step(s, p, c, True)
 
 
-@kernel
+@subroutine
 def _ask(
     s: Any,
     left_duty: float,

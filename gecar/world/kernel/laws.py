@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import LANES, kernel, lane_access, subroutine
+from gecar.compiled import LANES, any_integer, kernel, lane_access, subroutine
 from gecar.world.ports import (
     BOTH,
     CONSTANTS,
@@ -62,8 +62,9 @@ _LARGEST = 1e6
 _LEAST_DIVISOR = 1e-9
 _LARGEST_EXPONENT = 50.0
 _ROW = len(HANDS) * LANES
-MEAN = 2
+MEAN = any_integer(2)
 """Hand of what both wheels share."""
+_RIGHT, _ZERO = any_integer(RIGHT), any_integer(0)
 
 _MIN, _MAX = OPERATOR["min"], OPERATOR["max"]
 _PLUS, _MINUS, _TIMES, _OVER = (OPERATOR[mark] for mark in "+-*/")
@@ -177,9 +178,9 @@ def work_out(
         many = int(robot.terms[k, length])
         if hand != RIGHT:
             whose = LEFT if hand == BOTH else hand
-            scratch[values + lane] = law(robot, k, tokens, many, scratch, lanes, lane, whose)
+            scratch[values + lane] = law(robot, k, tokens, many, scratch, lanes + _ZERO, lane, whose)
         if hand in (BOTH, RIGHT):
-            scratch[values + lanes + lane] = law(robot, k, tokens, many, scratch, lanes, lane, RIGHT)
+            scratch[values + lanes + lane] = law(robot, k, tokens, many, scratch, lanes + _ZERO, lane, _RIGHT)
 
 
 @subroutine

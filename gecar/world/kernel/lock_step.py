@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import blank, kernel, lane_access, numbers
+from gecar.compiled import any_integer, blank, kernel, lane_access, numbers
 from gecar.world.effects import PHYSICS
 from gecar.world.kernel.contacts import sweep
 from gecar.world.kernel.dynamics import begin_as_asked, begin_step, drift, end_step, enter_step, reshape
@@ -21,6 +21,7 @@ from gecar.world.kernel.laws import N_SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.state import DERIVED, STATE
 from gecar.world.kernel.terms import ask, look_at
 
+_ZERO = any_integer(0)
 _VECTOR = 8  # numbers in the longest vector there is
 
 ACTING = np.dtype([(field, np.float64) for field in ("left", "right", "settled")])
@@ -58,7 +59,7 @@ def advance_lanes(flat: npt.NDArray[np.float64], lanes: int, effects: bool) -> N
     lanes, effects
         Constants where this is called, for vector code; ``effects`` as in `gecar.world.kernel.dynamics.begin_step`.
     """
-    unsettled = 0
+    unsettled = _ZERO
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         p = load_physics(flat, lanes, lane)
@@ -109,7 +110,7 @@ def advance_lanes_with_terms(
             c = load_derived(flat, lanes, lane)
             reshape(load_physics(flat, lanes, lane), load_asked(flat, lanes, lane), c)
             store_derived(flat, lanes, lane, c)
-    unsettled = 0
+    unsettled = _ZERO
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         p = load_physics(flat, lanes, lane)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.compiled import blank, kernel, subroutine
+from gecar.compiled import any_integer, blank, kernel, subroutine
 from gecar.world.kernel.laws import (
     ASKED_FIELDS,
     ASKED_OF_PORT,
@@ -52,12 +52,20 @@ _APART = 0.01  # rad, over which a radius's growth with the wheel's angle is mea
 _ANGLE, _LOAD, _X, _Y = (VARIABLE[name] for name in ("angle", "load", "x", "y"))
 _DISTANCE, _STORE = VARIABLE["distance"], VARIABLE["store"]
 
-PORT_ENCODER, PORT_GYRO, PORT_POSE_X, PORT_POSE_Y, PORT_POSE_HEADING = (
-    PORT_NUMBER[name] for name in ("encoder_reading", "gyro_reading", "pose_x", "pose_y", "pose_heading")
+PORT_ENCODER, PORT_GYRO, PORT_POSE_X, _COLOUR, _SENSOR_AHEAD, _SENSOR_ASIDE = (
+    any_integer(PORT_NUMBER[name])
+    for name in (
+        "encoder_reading",
+        "gyro_reading",
+        "pose_x",
+        "colour_reading",
+        "sensor_ahead",
+        "sensor_aside",
+    )
 )
-_COLOUR, _SENSOR_AHEAD, _SENSOR_ASIDE = (
-    PORT_NUMBER[name] for name in ("colour_reading", "sensor_ahead", "sensor_aside")
-)
+_LAW, _STORE_LAW, _ONE = (any_integer(number) for number in (LAW, STORE_LAW, 1))
+WHOLE = any_integer(0)
+"""Hand of a reading that neither wheel has for itself."""
 _TOWARD, _POSE_TOWARD, _POSE_TURN = (PORT_NUMBER[name] for name in AT_A_POINT)
 _RADIUS, _PLAY, _TRACK = (PORT_NUMBER[name] for name in ("rolling_radius", "gear_play", "track_width"))
 _ASKED_AT = np.array([ASKED_FIELDS.index(names[0]) for names in ASKED_OF_PORT])
@@ -143,7 +151,7 @@ def ask(robots: npt.NDArray[Any], alike: bool, dt: float, stores: Array, scratch
         if port == _TOWARD:
             _pull(robots, alike, k, scratch, lanes)
         else:
-            work_out(robots, alike, k, LAW, LENGTH, hand, scratch, lanes)
+            work_out(robots, alike, k, _LAW, LENGTH, hand, scratch, lanes)
             _add(_ASKED_AT[port], hand, scratch, lanes)
         if port == _RADIUS:
             _lift(robots, alike, k, side, scratch, lanes)
@@ -174,7 +182,7 @@ def _pull(robots: npt.NDArray[Any], alike: bool, k: int, scratch: Array, lanes: 
         dx, dy = _way_to_point(robots[lane], k, scratch, lanes, lane)
         distance = math.sqrt(dx * dx + dy * dy)
         scratch[2 * _DISTANCE * lanes + lane] = scratch[(2 * _DISTANCE + 1) * lanes + lane] = distance
-    work_out(robots, alike, k, LAW, LENGTH, MEAN, scratch, lanes)
+    work_out(robots, alike, k, _LAW, LENGTH, MEAN, scratch, lanes)
     for lane in range(lanes):
         dx, dy = _way_to_point(robots[lane], k, scratch, lanes, lane)
         pull = scratch[AT_VALUES * lanes + lane] / max(scratch[2 * _DISTANCE * lanes + lane], 1e-6)
@@ -199,11 +207,11 @@ def _lift(robots: npt.NDArray[Any], alike: bool, k: int, side: int, scratch: Arr
     for each in range(2 * lanes):
         scratch[kept + each] = scratch[angle + each]
         scratch[angle + each] += _APART
-    work_out(robots, alike, k, LAW, LENGTH, side, scratch, lanes)
+    work_out(robots, alike, k, _LAW, LENGTH, side, scratch, lanes)
     for each in range(2 * lanes):
         scratch[kept + 2 * lanes + each] = scratch[values + each]
         scratch[angle + each] = scratch[kept + each] - _APART
-    work_out(robots, alike, k, LAW, LENGTH, side, scratch, lanes)
+    work_out(robots, alike, k, _LAW, LENGTH, side, scratch, lanes)
     for lane in range(lanes):
         radius = robots[lane].wheel_radius * robots[lane].radius_scale
         for each in (lane, lanes + lane):
@@ -221,7 +229,7 @@ def _fill(
 
     It is exact where what the store fills toward stands still, or, of one that looks at itself, where its change does.
     """
-    work_out(robots, alike, k, STORE_LAW, STORE_LENGTH, BOTH, scratch, lanes)
+    work_out(robots, alike, k, _STORE_LAW, STORE_LENGTH, BOTH, scratch, lanes)
     for lane in range(lanes):
         robot = robots[lane]
         keep = math.exp(-dt / robot.terms[k, STORE_S])
@@ -240,9 +248,9 @@ def reading_error(port: int, hand: int, s: Any, p: Any, laws: Any) -> float:
     Parameters
     ----------
     port
-        ``PORT_ENCODER``, ``PORT_GYRO``, or ``PORT_POSE_X`` to ``PORT_POSE_HEADING``.
+        ``PORT_ENCODER``, ``PORT_GYRO``, or ``PORT_POSE_X`` and the two after it.
     hand
-        Of which wheel: 0 left, 1 right.
+        Of which wheel: 0 left, 1 right; or `WHOLE`.
     s, p
         Records of dtypes `STATE` and `PHYSICS`.
     laws
@@ -278,7 +286,7 @@ def colour_error(time: float, x: float, y: float, heading: float, reading: float
     v = blank(VIEW)
     _stand(v, time, x, y, heading)
     v.left_reading = v.right_reading = reading
-    return _reading_error(_COLOUR, 0, v, laws)
+    return _reading_error(_COLOUR, WHOLE, v, laws)
 
 
 @kernel
@@ -301,7 +309,7 @@ def sensor_shift(
     v.left_ahead = v.right_ahead = ahead
     v.left_aside = v.right_aside = aside
     v.left_turn_rate = v.right_turn_rate = turn_rate
-    return _reading_error(_SENSOR_AHEAD, 0, v, laws), _reading_error(_SENSOR_ASIDE, 0, v, laws)
+    return _reading_error(_SENSOR_AHEAD, WHOLE, v, laws), _reading_error(_SENSOR_ASIDE, WHOLE, v, laws)
 
 
 @kernel
@@ -322,7 +330,9 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
         of_wheel = port == PORT_ENCODER
         acts_at, side = int(laws.terms[k, PORT]), int(laws.terms[k, SIDE])
         if acts_at == port and (not of_wheel or side in (BOTH, hand)):
-            total += law(laws, k, LAW, int(laws.terms[k, LENGTH]), seen, 1, 0, hand if of_wheel else MEAN)
+            total += law(
+                laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, WHOLE, hand if of_wheel else MEAN
+            )
         elif acts_at == _POSE_TOWARD and 0 <= axis < 2:
             total += _toward(laws, k, seen)[axis]
         elif acts_at == _POSE_TURN and 0 <= axis < 3:
@@ -349,6 +359,6 @@ def _turned(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
 @kernel
 def _at_a_point(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
     """Return the way from the robot to a law's point, along x and y [m], and what the law gives at that distance."""
-    dx, dy = _way_to_point(laws, k, seen, 1, 0)
+    dx, dy = _way_to_point(laws, k, seen, _ONE, WHOLE)
     seen[2 * _DISTANCE] = seen[2 * _DISTANCE + 1] = math.sqrt(dx * dx + dy * dy)
-    return dx, dy, law(laws, k, LAW, int(laws.terms[k, LENGTH]), seen, 1, 0, MEAN)
+    return dx, dy, law(laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, WHOLE, MEAN)
