@@ -339,7 +339,8 @@ def _explain_sensor(
     residuals = fitted.of_sensor()
     if not residuals.recordings:
         return None
-    if motion.unexplained:  # a camera that errs says nothing of where the line lies
+    # A camera that errs by what matters over a metre says nothing of where the line lies.
+    if motion.unexplained or context.material.times(motion.left) > 1.0:
         known_place = tuple(effect for effect in context.catalogue if "pose" not in effect.needs)
         language = context.language and elsewhere(context.language, OF_THE_MOUNT)
         context = replace(context, catalogue=known_place, language=language)
