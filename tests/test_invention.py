@@ -262,27 +262,42 @@ def test_commands_that_act_late_are_written_as_such():
     assert law.parameters["store_s"].value == pytest.approx(0.07, rel=0.05)
 
 
-@pytest.mark.parametrize("found", ["beside", "leaves less", "gains more"])
-def test_laws_take_the_place_of_an_effect_that_imitates_them(monkeypatch, found):
-    """The effect goes where the law is found beside it, and where it is found without the effect alone."""
-    if found != "beside":
-        hidden_by_effects = discovery.invent
+@pytest.fixture
+def hidden_by_effects(monkeypatch):
+    """Laws are found where no effect was named, and nowhere else."""
+    invent = discovery.invent
 
-        def invent(explained, *args):
-            return (
-                Written(explained, (), ()) if explained.taken.effects else hidden_by_effects(explained, *args)
-            )
+    def without_effects(explained, *args):
+        return Written(explained, (), ()) if explained.taken.effects else invent(explained, *args)
 
-        monkeypatch.setattr(discovery, "invent", invent)
-    if found == "gains more":
-        monkeypatch.setattr(discovery, "_left", lambda stage: 2.0)
+    monkeypatch.setattr(discovery, "invent", without_effects)
+
+
+def late_and_imitated():
     runs = tuple(recorded(robot_with(dict(LAG)), seed) for seed in range(5))
     catalogue = [effect for effect in CATALOGUE if effect.id in ("rotor_inertia", "pose_delay")]
     alone = discover(Case("lag", runs), catalogue=catalogue)
     assert "rotor_inertia" in [found.id for found in alone.effects]
-    verdict = discover(Case("lag", runs), catalogue=catalogue, language=WHEELS_AND_LAG, invents=True)
+    return discover(Case("lag", runs), catalogue=catalogue, language=WHEELS_AND_LAG, invents=True)
+
+
+@pytest.mark.parametrize("without", [False, True], ids=["beside", "instead"])
+def test_laws_take_the_place_of_an_effect_that_imitates_them(request, without):
+    """The effect goes where the law is found beside it, and where it is found without the effect alone."""
+    if without:
+        request.getfixturevalue("hidden_by_effects")
+    verdict = late_and_imitated()
     assert verdict.effects == ()
     assert [law.term.port for law in verdict.invented] == ["command"]
+
+
+@pytest.mark.usefixtures("hidden_by_effects")
+@pytest.mark.parametrize(("gained", "stays"), [(10.0, False), (90.0, True)])
+def test_laws_that_leave_as_much_must_explain_far_more(monkeypatch, gained, stays):
+    monkeypatch.setattr(discovery, "_left", lambda stage: 2.0)
+    monkeypatch.setattr(discovery, "_gain", lambda bare, stage: 100.0 if stage.laws else gained)
+    verdict = late_and_imitated()
+    assert (bool(verdict.effects), bool(verdict.invented)) == (stays, not stays)
 
 
 @pytest.mark.parametrize("before", ["nothing", "refused", "another"])

@@ -250,9 +250,9 @@ def _alike_but_for_a_patch(
 ) -> Iterator[tuple[npt.NDArray[Any], npt.NDArray[np.int_]]]:
     """Yield records without a slippery patch, shape (1,), and the numbers of those that are one of them with a patch.
 
-    Few are left out, and so are those with terms.
+    Few are left out.
     """
-    patched = np.flatnonzero((physics["patch_radius"] > 0.0) & (physics["n_terms"] == 0.0))
+    patched = np.flatnonzero(physics["patch_radius"] > 0.0)
     if len(patched) < FEWEST_LANES:
         return
     bare = physics[patched]
