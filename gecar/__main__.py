@@ -21,9 +21,9 @@ def main() -> None:
         )
 
         remember_interrupts()
-        from gecar.cli.application import application  # noqa: PLC0415
-
         with interrupts_told():
+            from gecar.cli.application import application  # noqa: PLC0415
+
             application()()
     except InputError as error:
         _end(f"error: {error}", 2)

@@ -126,6 +126,18 @@ def test_what_compiled_code_makes_of_an_interrupt_is_an_interrupt_again() -> Non
         raise SystemError("something else")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_an_interrupt_while_a_class_is_made_is_an_interrupt() -> None:
+    class Named:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), interrupts_told():
+        type("Made", (), {"field": Named()})
+    with pytest.raises(RuntimeError), interrupts_told():
+        raise RuntimeError("something else")
+
+
 def test_an_interrupt_that_something_dropped_is_raised_at_the_next_turn() -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -37,13 +37,14 @@ def raise_if_interrupted() -> None:
 
 @contextmanager
 def interrupts_told() -> Iterator[None]:
-    """Raise `KeyboardInterrupt` for a Ctrl-C that compiled code turned into a `SystemError`.
+    """Raise `KeyboardInterrupt` for a Ctrl-C that came out as another exception, with the Ctrl-C as its cause.
 
-    Numba does when it is interrupted while it reads its arguments: it returns a result and leaves the exception set.
+    Numba makes it a `SystemError` if it is interrupted while it reads its arguments: it returns a result and leaves the
+    exception set. Python before 3.12 makes it a `RuntimeError` while a class is made, as in a module that is imported.
     """
     try:
         yield
-    except SystemError as error:
+    except (SystemError, RuntimeError) as error:
         if not isinstance(error.__cause__, KeyboardInterrupt):
             raise
         raise KeyboardInterrupt from error
