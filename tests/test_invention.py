@@ -273,12 +273,10 @@ def hidden_by_effects(monkeypatch):
     monkeypatch.setattr(discovery, "invent", without_effects)
 
 
-def late_and_imitated():
+def late_and_imitated(**language):
     runs = tuple(recorded(robot_with(dict(LAG)), seed) for seed in range(5))
     catalogue = [effect for effect in CATALOGUE if effect.id in ("rotor_inertia", "pose_delay")]
-    alone = discover(Case("lag", runs), catalogue=catalogue)
-    assert "rotor_inertia" in [found.id for found in alone.effects]
-    return discover(Case("lag", runs), catalogue=catalogue, language=WHEELS_AND_LAG, invents=True)
+    return discover(Case("lag", runs), catalogue=catalogue, **language)
 
 
 @pytest.mark.parametrize("without", [False, True], ids=["beside", "instead"])
@@ -286,7 +284,8 @@ def test_laws_take_the_place_of_an_effect_that_imitates_them(request, without):
     """The effect goes where the law is found beside it, and where it is found without the effect alone."""
     if without:
         request.getfixturevalue("hidden_by_effects")
-    verdict = late_and_imitated()
+    assert "rotor_inertia" in [found.id for found in late_and_imitated().effects]
+    verdict = late_and_imitated(language=WHEELS_AND_LAG, invents=True)
     assert verdict.effects == ()
     assert [law.term.port for law in verdict.invented] == ["command"]
 
@@ -296,7 +295,7 @@ def test_laws_take_the_place_of_an_effect_that_imitates_them(request, without):
 def test_laws_that_leave_as_much_must_explain_far_more(monkeypatch, gained, stays):
     monkeypatch.setattr(discovery, "_left", lambda stage: 2.0)
     monkeypatch.setattr(discovery, "_gain", lambda bare, stage: 100.0 if stage.laws else gained)
-    verdict = late_and_imitated()
+    verdict = late_and_imitated(language=WHEELS_AND_LAG, invents=True)
     assert (bool(verdict.effects), bool(verdict.invented)) == (stays, not stays)
 
 

@@ -167,7 +167,7 @@ def robots_with_laws() -> np.ndarray:
     at_port = {
         laws[0].port: [other for other in singles if other[0].port == laws[0].port] for laws in singles
     }
-    chosen = [laws for here in at_port.values() for laws in here[:: max(len(here) // 12, 1)]]
+    chosen = [laws for here in at_port.values() for laws in here[:: max(len(here) // 8, 1)]]
     drag = Term(port="motor_torque", law="-a * speed * abs(speed)", a=1e-5)
     robots = []
     for laws in chosen:
