@@ -31,7 +31,7 @@ from gecar.reality.replay.pose_filter import (
     rebase,
 )
 from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, step_with_terms
-from gecar.world.kernel.laws import N_STORES
+from gecar.world.kernel.laws import N_STORES, SUPPLY_ASKED
 from gecar.world.kernel.lock_step import (
     N_FIELDS,
     advance_lanes,
@@ -55,7 +55,7 @@ from gecar.world.kernel.terms import (
     WHOLE,
     reading_error,
 )
-from gecar.world.ports import N_TERMS, PORT
+from gecar.world.ports import PORT
 from gecar.world.terms import formulas_of
 
 Array = npt.NDArray[np.float64]
@@ -269,6 +269,15 @@ def _begin(physics: npt.NDArray[Any], start: Array, dt: float, flat: Array, lane
 
 
 @kernel
+def _act(left: float, right: float, flat: Array, lanes: int) -> None:
+    """Let the same commands act in every lane."""
+    for lane in range(lanes):
+        a = load_acting(flat, lanes, lane)
+        a.left, a.right = left, right
+        store_acting(flat, lanes, lane, a)
+
+
+@kernel
 def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int) -> None:
     """Advance every lane by one step under the same commands."""
     if bench:
@@ -277,10 +286,7 @@ def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int) ->
             bench_step(s, left, right, load_physics(flat, lanes, lane), load_derived(flat, lanes, lane))
             store_state(flat, lanes, lane, s)
         return
-    for lane in range(lanes):
-        a = load_acting(flat, lanes, lane)
-        a.left, a.right = left, right
-        store_acting(flat, lanes, lane, a)
+    _act(left, right, flat, lanes)
     advance_lanes(flat, lanes, effects=True)
 
 
@@ -326,10 +332,7 @@ def _advance_several_with_terms(
     flat: Array,
 ) -> None:
     """Do the same for `LANES` robots with terms, on the floor."""
-    for lane in range(LANES):
-        a = load_acting(flat, LANES, lane)
-        a.left, a.right = left, right
-        store_acting(flat, LANES, lane, a)
+    _act(left, right, flat, LANES)
     advance_lanes_with_terms(flat, LANES, robots, alike, stores)
 
 
@@ -347,7 +350,7 @@ def _set_off_of_row(flat: Array, lanes: int, robots: npt.NDArray[Any], stores: A
     """Set what terms add to a row's angles and battery."""
     for lane in range(lanes):
         r = _load_row(flat, lanes, lane)
-        r.battery_off = stores[2 * N_TERMS * lanes + lane]
+        r.battery_off = stores[SUPPLY_ASKED * lanes + lane]
         if reads:
             s, p = load_state(flat, lanes, lane), robots[lane]
             r.left_off = reading_error(PORT_ENCODER, _LEFT, s, p, p)

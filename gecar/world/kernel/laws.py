@@ -42,7 +42,8 @@ ASKED_FIELDS = (*itertools.chain(*ASKED_OF_PORT), "shape_terms")
 ASKED = np.dtype([(field, np.float64) for field in ASKED_FIELDS])
 """What terms ask for at the ports of the dynamics in a step."""
 
-N_STORES = 2 * N_TERMS + 1
+SUPPLY_ASKED = len(HANDS) * N_TERMS
+N_STORES = SUPPLY_ASKED + 1
 """What each term has stored, of either wheel; and what terms asked of the battery in the last step [V]."""
 
 # Terms of several robots are worked out together, one robot a lane; field f of lane k stands at ``f * lanes + k``.
@@ -122,7 +123,7 @@ def _of_one(code: int, a: float) -> float:  # noqa: C901, PLR0911
 
 @subroutine
 def law(robot: Any, k: int, first: int, length: int, seen: Array, lanes: int, lane: int, hand: int) -> float:
-    """Return what a law gives for one wheel; hand 2 stands for the mean of both wheels' variables."""
+    """Return what a law gives for one wheel; hand `MEAN` stands for both wheels' mean variables."""
     a = b = d = e = f = g = 0.0  # the stack, its top first
     for at in range(first, first + length):
         code = int(robot.terms[k, at])
@@ -140,9 +141,9 @@ def law(robot: Any, k: int, first: int, length: int, seen: Array, lanes: int, la
 @kernel
 def _variable(number: int, seen: Array, lanes: int, lane: int, hand: int) -> float:
     left, right = 2 * number * lanes + lane, (2 * number + 1) * lanes + lane
-    if hand == 2:
+    if hand == MEAN:
         return 0.5 * (seen[left] + seen[right])
-    return seen[right] if hand == 1 else seen[left]
+    return seen[right] if hand == RIGHT else seen[left]
 
 
 @kernel

@@ -21,6 +21,7 @@ from gecar.world.kernel.laws import (
     MEAN,
     OF_BODY,
     SCRATCH,
+    SUPPLY_ASKED,
     VIEW,
     law,
     store_view,
@@ -34,7 +35,6 @@ from gecar.world.ports import (
     BOTH,
     LAW,
     LENGTH,
-    N_TERMS,
     OF_ITSELF,
     PORT,
     PORT_NUMBER,
@@ -63,7 +63,7 @@ PORT_ENCODER, PORT_GYRO, PORT_POSE_X, _COLOUR, _SENSOR_AHEAD, _SENSOR_ASIDE = (
         "sensor_aside",
     )
 )
-_LAW, _STORE_LAW, _ONE = (any_integer(number) for number in (LAW, STORE_LAW, 1))
+_LAW, _STORE_LAW, _ONE, _FIRST = (any_integer(number) for number in (LAW, STORE_LAW, 1, 0))
 WHOLE = any_integer(0)
 """Hand of a reading that neither wheel has for itself."""
 _TOWARD, _POSE_TOWARD, _POSE_TURN = (PORT_NUMBER[name] for name in AT_A_POINT)
@@ -160,7 +160,7 @@ def ask(robots: npt.NDArray[Any], alike: bool, dt: float, stores: Array, scratch
         if first.terms[k, STORE_LENGTH] > 0.0:
             _fill(robots, alike, k, dt, stores, scratch, lanes)
     for lane in range(lanes):
-        stores[2 * N_TERMS * lanes + lane] = scratch[(AT_ASKED + _SUPPLY) * lanes + lane]
+        stores[SUPPLY_ASKED * lanes + lane] = scratch[(AT_ASKED + _SUPPLY) * lanes + lane]
 
 
 @kernel
@@ -331,7 +331,7 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
         acts_at, side = int(laws.terms[k, PORT]), int(laws.terms[k, SIDE])
         if acts_at == port and (not of_wheel or side in (BOTH, hand)):
             total += law(
-                laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, WHOLE, hand if of_wheel else MEAN
+                laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, _FIRST, hand if of_wheel else MEAN
             )
         elif acts_at == _POSE_TOWARD and 0 <= axis < 2:
             total += _toward(laws, k, seen)[axis]
@@ -359,6 +359,6 @@ def _turned(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
 @kernel
 def _at_a_point(laws: Any, k: int, seen: Array) -> tuple[float, float, float]:
     """Return the way from the robot to a law's point, along x and y [m], and what the law gives at that distance."""
-    dx, dy = _way_to_point(laws, k, seen, _ONE, WHOLE)
+    dx, dy = _way_to_point(laws, k, seen, _ONE, _FIRST)
     seen[2 * _DISTANCE] = seen[2 * _DISTANCE + 1] = math.sqrt(dx * dx + dy * dy)
-    return dx, dy, law(laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, WHOLE, MEAN)
+    return dx, dy, law(laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, _FIRST, MEAN)
