@@ -28,7 +28,7 @@ from gecar.reality.discovery import discover
 from gecar.reality.invent import beside, invention
 from gecar.reality.invent.looks import looks_like
 from gecar.reality.invent.proof import left_out_gains, simplified
-from gecar.reality.invent.search import Library, fit
+from gecar.reality.invent.search import Library, fit, search
 from gecar.reality.invent.sentences import (
     complexity,
     elsewhere,
@@ -55,7 +55,7 @@ from gecar.report.verdict_page import verdict_html
 from gecar.world.effects import BY_ID, CATALOGUE
 from gecar.world.ports import PORTS
 from gecar.world.robot import read_robot, write_robot
-from gecar.world.terms import Term
+from gecar.world.terms import POINT, Term
 
 FEW = parse_grammar(
     """
@@ -141,7 +141,10 @@ def test_what_has_no_derivative_at_none_is_found_by_finite_probes(hidden, size):
 
 
 def library_of(*tables, rig="floor"):
-    runs = [recorded(robot_with(*map(dict, tables)), seed, rig=rig) for seed in range(5)]
+    return library_on([recorded(robot_with(*map(dict, tables)), seed, rig=rig) for seed in range(5)])
+
+
+def library_on(runs):
     fitted = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
     problem = problem_of(fitted, EV3, observable(UNRELATED, fitted))
     problem = problem.under(problem.known)
@@ -153,6 +156,22 @@ def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"
     law = fit(library, library.started(read_sentence(sum_of_three)))
     assert [term.law for term in simplified(library, law)[0].terms] == ["c1 * speed * abs(speed)"]
+
+
+def test_a_form_that_the_grid_of_points_hides_is_found_at_the_point_of_another():
+    """A camera's lens, of the third power: from the only point where the grid has it, its fit ends elsewhere."""
+    runs, at = [], np.array([1.2, 0.3])
+    for seed in range(5):
+        run = recorded(EV3, seed)
+        off = np.stack([run.x_m, run.y_m], axis=1) - at
+        seen = at + off * (1.0 + 0.25 * np.sum(off**2, axis=1, keepdims=True))
+        runs.append(replace(run, x_m=seen[:, 0], y_m=seen[:, 1]))
+    square, third = "c * distance ** 2; at: 1.0 0.5", "c * distance * distance ** 2; at: -0.5 2.5"
+    language = parse_grammar(f"<t> ::= pose_toward: {square} | pose_toward: {third}")
+    (best,) = search(library_on(runs), language, ["pose_toward"])[0].terms
+    assert best.law == "c1 * distance * distance ** 2"
+    assert best.constants["c1"] == pytest.approx(-0.25, rel=0.05)
+    assert [best.constants[name] for name in POINT] == pytest.approx(at, abs=0.02)
 
 
 TOOTH = frozen(

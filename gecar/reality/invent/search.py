@@ -40,7 +40,7 @@ from gecar.reality.invent.sentences import (
 from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
 from gecar.reality.selection.problem import Problem
 from gecar.world.ports import BY_PORT, CONSTANTS, N_TERMS
-from gecar.world.terms import Term
+from gecar.world.terms import POINT, Term
 
 Array = npt.NDArray[np.float64]
 Column = npt.NDArray[np.float32]
@@ -59,6 +59,7 @@ EVOLUTION = EvolutionSettings(
     crossover="subtree", crossover_rate=0.7, mutation="one_used_codon", duplicates="run", tournament=4,
 )  # fmt: skip
 FINALISTS = 12
+FORMS = 3  # of a law, fitted in full at the point of the best law
 AT_BEST = 5  # laws of one part that are fitted in full at the best law's port
 ROUNDS = 8
 OWN_SHARE = 1e-4  # of a column's square that the model's own parameters do not hold; less is none of its own
@@ -274,6 +275,8 @@ def search(
     candidates = {key(laws): laws for laws in (*_greedy_sums(library, kept), *evolved, *kept)}
     ranked = sorted(candidates.values(), key=lambda laws: _loss(library, laws))
     fitted = [fit(library, library.started(laws)) for laws in _spread_over_ports(ranked)]
+    best = max(fitted, key=lambda law: law.worth)
+    fitted += [fit(library, library.started(laws)) for laws in _other_forms(library, best, singles)]
     return sorted(fitted, key=lambda law: -law.worth)
 
 
@@ -289,6 +292,20 @@ def _promising(library: Library, singles: Sequence[Laws]) -> set[str]:
             best_at[port] = max(best_at[port], gain)
             best_of[BY_PORT[port].sensor] = max(best_of[BY_PORT[port].sensor], gain)
     return {port for port, gain in best_at.items() if gain >= PORTS_KEPT * best_of[BY_PORT[port].sensor]}
+
+
+def _other_forms(library: Library, law: Law, singles: Sequence[Laws]) -> list[Laws]:
+    """Return laws of other forms at the point where a law's fit ended; none for a law without a point.
+
+    They were tried on a coarse grid of points, where another form may seem to be the best.
+    """
+    at = {name: value for name, value in law.terms[0].constants.items() if name in POINT}
+    if not at:
+        return []
+    here = [laws[0].with_constants(at) for laws in singles if laws[0].port == law.terms[0].port]
+    moved: dict[str, Laws] = {key((term,)): (term,) for term in here}
+    moved.pop(key(law.terms), None)
+    return sorted(moved.values(), key=lambda laws: _loss(library, laws))[:FORMS]
 
 
 def fit(library: Library, laws: Laws) -> Law:
