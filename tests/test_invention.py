@@ -318,6 +318,38 @@ def test_laws_that_leave_as_much_must_explain_far_more(monkeypatch, gained, stay
     assert (bool(verdict.effects), bool(verdict.invented)) == (stays, not stays)
 
 
+OVAL = parse_grammar(
+    """
+    <term> ::= rolling_radius: <r> | rolling_radius: <r> + <r> | motor_torque: c * speed
+    <r> ::= c * sin(2 * angle) | c * cos(2 * angle)
+    """
+)
+
+
+def with_oval_wheels(share):
+    oval = {"port": "rolling_radius", "law": "c1 * sin(2 * angle)", "c1": share}
+    runs = tuple(recorded(robot_with(oval), seed) for seed in range(5))
+    return discover(Case("oval", runs), catalogue=[BY_ID["torque_ripple"]], language=OVAL)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.04], ids=["nothing named", "in the place of a name"])
+def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkeypatch, share):
+    verdict = with_oval_wheels(share)
+    assert verdict.verdict == "invented"
+    (law,) = verdict.invented
+    assert law.term.law == "c1 * sin(k1 * angle)"
+    assert law.parameters["c1"].value == pytest.approx(share, rel=0.1)
+    monkeypatch.setattr(discovery, "STANDING_OUT", np.inf)
+    assert with_oval_wheels(share).invented == ()
+
+
+def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(monkeypatch):
+    monkeypatch.setattr(discovery, "_is_left", lambda _: True)
+    assert with_oval_wheels(0.008).verdict == "nothing"
+    monkeypatch.setattr(discovery, "_is_material", lambda _: True)
+    assert with_oval_wheels(0.008).verdict == "invented"
+
+
 @pytest.mark.parametrize("before", ["nothing", "refused", "another"])
 def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, before):
     """After the law, which hides it till then, before a second one; or taken back where no law holds without it.

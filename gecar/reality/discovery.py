@@ -51,7 +51,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
-from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
+from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE, STANDING_OUT
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -360,13 +360,17 @@ def _explain_sensor(
 def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     """Add laws that explain what a stage's effects do not, where laws are wanted.
 
-    Effects may imitate what no list holds: unless they have one size in all recordings, and leave nothing beside laws,
-    laws are written in their place, too, and taken if they leave far less, or no more and explain far more.
+    They are wanted where what is left is material, and where it stands far out of what changes of the robot's constants
+    could be; there they must be material themselves. Effects may imitate what no list holds: if what is left beside
+    laws still asks for laws, they are written in the place of the effects, too, and taken if they leave far less, or no
+    more and explain far more.
     """
-    if context.language is None or not (stage.explained.unexplained or context.invents):
+    if context.language is None or not (context.invents or _is_left(stage)):
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
-    if not stage.explained.steps or _left(beside) < 1.0 or _stands(beside):
+    if not (context.invents or stage.explained.unexplained or _is_material(beside)):
+        beside = stage
+    if not beside.explained.steps or not _is_left(beside):
         return beside
     context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
     problem = stage.explained.problem
@@ -374,14 +378,20 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
     gains = [_gain(bare, each) for each in (beside, alone)]
     far_less = _left(alone) < INSTEAD * _left(beside)
-    far_more = _left(alone) <= _left(beside) and gains[0] < INSTEAD * gains[1]
+    far_more = max(_left(alone), 1.0) <= max(_left(beside), 1.0) and gains[0] < INSTEAD * gains[1]
     return alone if far_less or far_more else beside
 
 
-def _stands(stage: _Stage) -> bool:
-    """Whether a stage leaves nothing unexplained, and each of its effects has one size in all recordings."""
-    explained = stage.explained
-    return not explained.unexplained and all(stands_out(explained.problem, step) for step in explained.steps)
+def _is_left(stage: _Stage) -> bool:
+    """Whether something is left that a law may explain: it is material, or stands out of all that constants explain."""
+    found = stage.explained.problem.estimator.discrepancy
+    return stage.explained.unexplained or (found is not None and float(found.ratios.max()) > STANDING_OUT)
+
+
+def _is_material(stage: _Stage) -> bool:
+    """Whether a stage's laws do something material to the robot."""
+    material = stage.explained.problem.material
+    return any(material.times(law.size) >= 1.0 for law in stage.invented)
 
 
 def _gain(bare: Explanation, stage: _Stage) -> float:
