@@ -11,6 +11,8 @@ import pytest
 from linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
 from scipy.signal import lfilter
 
+from gecar.reality.fitting.model import Model
+from gecar.reality.materiality import Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
 from gecar.reality.prove import confirmation
@@ -21,6 +23,7 @@ from gecar.reality.selection.acceptance import candidates, stands_out, unevennes
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
+from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, share_asked_for
 from gecar.reality.selection.stepwise import explain
@@ -194,6 +197,22 @@ def test_a_strong_cause_is_named_though_its_size_seems_to_differ_by_a_tenth() ->
     assert step.effect == VISCOUS
     assert (step.left_out > 100.0).all()  # its own small change does not hide what recordings have in common
     assert not explained.drifting
+
+
+def test_a_small_effect_that_leaves_more_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    left_by = stepwise.left_by
+
+    def astray(problem: Problem, model: Model) -> Size:
+        left = left_by(problem, model)
+        return replace(left, mm_1m=50.0) if INERTIA in model.effects else left
+
+    monkeypatch.setattr(stepwise, "left_by", astray)
+    for judgement in ("is_worthwhile", "stands_out"):  # neither is worth a name beside what is unexplained
+        monkeypatch.setattr(stepwise, judgement, lambda *_: False)
+    explained = explain(linear_problem(linear({VISCOUS: 3.0, INERTIA: 1.7}, RESPONSES)))
+    assert [step.effect for step in explained.tried[1] if step.gain > 10.0] == [INERTIA]
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert not explained.unexplained
 
 
 def test_a_twentieth_of_a_loud_case_is_not_left_without_a_word() -> None:

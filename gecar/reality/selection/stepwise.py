@@ -175,21 +175,21 @@ def _standing_beside(
     """Return the effects that may be named beside what they leave: all, unless that is material.
 
     Then effects below the catalogue's size must stand out of it, as they may be part of what is left; and all must
-    where they leave much of it: the most uneven goes first, as it bends the others.
+    where they leave much of it. One goes at a time, for without it the others may leave less: of those too small the
+    one that gains least, of the others the most uneven, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
     if not is_much(now, before, left_share(model.effects)):
         return list(steps)
-    kept = [
+    small = [
         step
         for step in steps
-        if problem.on_bench or is_worthwhile(model, step.effect) or stands_out(problem, step)
+        if not (problem.on_bench or is_worthwhile(model, step.effect) or stands_out(problem, step))
     ]
     hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
-    if len(kept) < len(steps) or not hardly:
-        return kept
-    worst = most_uneven(problem, kept)
-    return [step for step in kept if step is not worst]
+    uneven = most_uneven(problem, steps) if hardly else None
+    worst = min(small, key=lambda step: step.gain, default=uneven)
+    return [step for step in steps if step is not worst]
 
 
 def left_by(problem: Problem, model: Model) -> Size:
