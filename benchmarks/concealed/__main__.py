@@ -73,6 +73,11 @@ def _parser() -> argparse.ArgumentParser:
     _ask_counts(plan)
     plan.add_argument("--last", action="store_true", help="also the kinds kept for the last examination")
     plan.add_argument(
+        "--final",
+        action="store_true",
+        help="what is outside the catalogue is of the final set of kinds (final_kinds.py), and of no other",
+    )
+    plan.add_argument(
         "--pace",
         type=float,
         default=1.0,
@@ -224,6 +229,7 @@ def _plan(chosen: argparse.Namespace) -> int:
         _by_world(chosen),
         background=background,
         last=chosen.last,
+        final=chosen.final,
         pace=chosen.pace,
         without=chosen.without,
         material=chosen.material,

@@ -110,10 +110,18 @@ def _wheel(concealed: Concealed, side: str, y: float, radius: float) -> str:
     braking = base.torque_constant * base.back_emf_constant / base.resistance
     damping = braking + concealed.viscous_friction
     return (
-        f'<body name="{side}_shaft" pos="0 {y!r} 0"><joint name="{side}" type="hinge" axis="0 1 0" '
+        f'<body name="{side}_shaft" pos="0 {y!r} 0"{_toe(concealed, side)}>'
+        f'<joint name="{side}" type="hinge" axis="0 1 0" '
         f'armature="{base.shaft_inertia * concealed.inertia_scale!r}" damping="{damping!r}" '
         f'frictionloss="{max(concealed.coulomb_friction, 1e-9)!r}" {_HARD.format("friction")}/>{wheel}</body>'
     )
+
+
+def _toe(concealed: Concealed, side: str) -> str:
+    """Turn a shaft that does not lie square to the chassis."""
+    if concealed.toe is None or concealed.toe[1] != ("left", "right").index(side):
+        return ""
+    return f' euler="0 0 {math.degrees(concealed.toe[0])!r}"'
 
 
 def _tread(concealed: Concealed, side: str, radius: float) -> str:

@@ -131,6 +131,7 @@ class ColourSensor:
             ahead, left = ahead + self._swing[0], left + self._swing[1]
         spot_x = x + cos * ahead - sin * left
         spot_y = y + sin * ahead + cos * left
+        shade = self._shade(spot_x, spot_y)
         dx, dy, angle = hidden.line_shift
         if (dx, dy, angle) != (0.0, 0.0, 0.0):
             cos, sin = math.cos(angle), math.sin(angle)
@@ -140,6 +141,7 @@ class ColourSensor:
         if hidden.ambient is not None:
             loss, source = hidden.ambient
             light *= 1.0 - loss * (1.0 - math.cos(heading - source)) / 2.0
+        light *= 1.0 - shade
         if hidden.gamma != 1.0:
             light = 100.0 * max(light / 100.0, 0.0) ** hidden.gamma
         if hidden.gloss is not None:
@@ -148,6 +150,14 @@ class ColourSensor:
             shine = math.sin(turn * spot_x + phase_x) * math.sin(turn * spot_y + phase_y)
             light *= 1.0 - share * (1.0 + shine) / 2.0
         return light
+
+    def _shade(self, x: float, y: float) -> float:
+        """Give the share of light that a shadow takes, whose edge is straight and blurred."""
+        if self._hidden.shadow is None:
+            return 0.0
+        loss, edge_x, blur, way = self._hidden.shadow
+        into = math.cos(way) * (x - edge_x) + math.sin(way) * (y - FIELD[1] / 2.0)
+        return loss * min(max(into / blur + 0.5, 0.0), 1.0)
 
     def _sway(self, x: float, y: float, heading: float) -> None:
         """Let the loose mount swing: a damped spring that the robot's acceleration at (x, y) shakes."""

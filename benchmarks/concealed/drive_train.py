@@ -7,10 +7,11 @@ from collections import deque
 from dataclasses import dataclass
 
 from benchmarks.concealed.history import TICK_S
-from benchmarks.concealed.robot import DUTY_CAP, Concealed
+from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 
 _LIMITER_GAIN = 20.0  # V s / rad: the speed limiter lets go of the whole supply within 0.4 rad/s
 _TOOTH_BLEND = 0.2  # rad/s: below this a damaged tooth lets go, so that it cannot drive the robot
+_RUB_BLEND = 0.5  # rad/s: below this difference of speeds the axles' rubbing fades out
 _BAND_SLIPS = 10.0  # rad: a rubber band round the axle slips rather than winding up for ever
 
 
@@ -41,6 +42,8 @@ class DriveTrain:
         gain = concealed.gain_difference / 2.0
         self._gains = (1.0 - gain, 1.0 + gain)
         self._varying_friction = concealed.static_friction > 0.0
+        self._driven_at = [[-math.inf, -math.inf], [-math.inf, -math.inf]]  # s, by side: backward, forward
+        self._kept = [0.0, 0.0]  # shares of the supply that the firmware adds to keep the speed
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
         """Pass one tick's command through delay, ramp, cap and dead band.
@@ -68,10 +71,33 @@ class DriveTrain:
                 old + min(max(new - old, -most), most) for old, new in zip(self._ramped, late, strict=True)
             )
             self._ramped = late
+        if self._hidden.reversal_pause > 0.0:
+            late = self._paused(0, late[0], time_s), self._paused(1, late[1], time_s)
         left, right = self._shaped(late[0]), self._shaped(late[1])
         if left != 0.0 and right != 0.0:
             left, right = left * (1.0 - self._hidden.shared_drop), right * (1.0 - self._hidden.shared_drop)
+        if self._hidden.wander is not None:
+            left, right = self._wandered(0, left, time_s), self._wandered(1, right, time_s)
         return left * self._gains[0], right * self._gains[1]
+
+    def _wandered(self, side: int, duty: float, time_s: float) -> float:
+        """Change one motor's drive by what is drawn for every half second, and lies between two draws in between."""
+        which, knots = self._hidden.wander or (0, (0.0,))
+        place = min(time_s / KNOT_S, len(knots) - 1.0)
+        before = min(int(place), len(knots) - 2)
+        share = place - before
+        changed = (1.0 - share) * knots[before] + share * knots[before + 1]
+        return duty * (1.0 + changed) if which == side else duty
+
+    def _paused(self, side: int, duty_pct: float, time_s: float) -> float:
+        """Withhold a duty until the motor has not been driven the other way for a while."""
+        if duty_pct == 0.0:
+            return 0.0
+        way, driven_at = int(duty_pct > 0.0), self._driven_at[side]
+        if time_s - driven_at[1 - way] < self._hidden.reversal_pause:
+            return 0.0
+        driven_at[way] = time_s
+        return duty_pct
 
     def drive(
         self,
@@ -95,12 +121,17 @@ class DriveTrain:
         -------
         Drive
         """
+        if self._hidden.keeper is not None:
+            duties = self._keep(0, duties[0], speeds[0]), self._keep(1, duties[1], speeds[1])
         terminal = self._terminal(duties, speeds, time_s)
         torques = tuple(
             self._torque(i, duties[i] * terminal, speeds[i], angles[i])
             + self._oddities(i, duties[i] * terminal, speeds[i], angles[i], time_s)
             for i in (0, 1)
         )
+        if self._hidden.axle_rub > 0.0:
+            rub = self._hidden.axle_rub * math.tanh((speeds[0] - speeds[1]) / _RUB_BLEND)
+            torques = torques[0] - rub, torques[1] + rub
         friction = (self._friction(speeds[0]), self._friction(speeds[1]))
         return Drive(torques, friction, terminal)  # type: ignore[arg-type]
 
@@ -115,6 +146,14 @@ class DriveTrain:
         if abs(duty) < band:
             return 0.0
         return duty if self._hidden.dead_band_is_threshold else duty - math.copysign(band, duty)
+
+    def _keep(self, side: int, duty: float, speed: float) -> float:
+        """Add the integral of what the speed lacks of a motor's that runs free under this duty; none at rest."""
+        rate, most = self._hidden.keeper or (0.0, 0.0)
+        lacking = duty - speed * self._base.back_emf_constant / self._base.supply
+        kept = min(max(self._kept[side] + TICK_S * rate * lacking, -most), most)
+        self._kept[side] = kept if duty != 0.0 else 0.0
+        return min(max(duty + self._kept[side], -1.0), 1.0)
 
     def _terminal(self, duties: tuple[float, float], speeds: tuple[float, float], time_s: float) -> float:
         """Voltage at the terminals: a chopper draws duty x motor current from a source behind a resistance."""

@@ -30,7 +30,7 @@ class Outside:
     needs
         Columns without which it leaves no trace.
     last
-        Whether it is kept for the last examination.
+        Whether it is kept for the last examination; of ``FINAL``, every one.
     """
 
     words: str

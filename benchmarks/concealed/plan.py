@@ -21,7 +21,9 @@ from benchmarks.concealed.cases import (
     unlike_neutral,
 )
 from benchmarks.concealed.effects import EFFECTS
+from benchmarks.concealed.final_kinds import FINAL
 from benchmarks.concealed.outside import OUTSIDE
+from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.worlds import holds
 
 _ALIKE = 1.0 / 3.0  # share of pairs from one group
@@ -62,6 +64,7 @@ def plan(
     pace: float = 1.0,
     without: str = "",
     material: bool = False,
+    final: bool = False,
 ) -> list[Planned]:
     """List the cases of an examination.
 
@@ -74,13 +77,15 @@ def plan(
     background
         Whether robots have a background; see :class:`benchmarks.concealed.cases.Manner`.
     last
-        Whether the kinds kept for the last examination are drawn, too.
+        Whether the kinds of ``SEALED`` kept for the last examination are drawn, too.
     pace
         Share of the usual duties; see :class:`benchmarks.concealed.cases.Manner`.
     without
         A sensor that no case has; what it alone shows is not concealed.
     material
         Whether all that is concealed is material; see :class:`benchmarks.concealed.cases.Manner`.
+    final
+        Whether the kinds outside the catalogue are those of ``FINAL``, and no others.
 
     Returns
     -------
@@ -91,7 +96,8 @@ def plan(
     contents: list[tuple[str, tuple[str, ...], Manner]] = []
     for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
         manner = Manner(world, background, pace, without, material)
-        contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, last)]
+        kinds = outside_kinds(manner, last=last, final=final)
+        contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, kinds)]
     order = rng.permutation(len(contents))
     return [
         Planned(f"c{place + 1:03d}", *contents[index][:2], (seed, 1 + int(index)), contents[index][2])
@@ -99,24 +105,40 @@ def plan(
     ]
 
 
-def outside_kinds(manner: Manner, *, last: bool) -> list[str]:
-    """List the kinds outside the catalogue that can be drawn: without a background, those of the first examinations."""
-    kinds = ALL_OUTSIDE if manner.background else OUTSIDE
+def outside_kinds(manner: Manner, *, last: bool, final: bool = False) -> list[str]:
+    """List the kinds outside the catalogue that can be drawn: without a background, those of the first examinations.
+
+    Parameters
+    ----------
+    manner
+        Of the cases.
+    last
+        Whether kinds kept for the last examination are among them.
+    final
+        Whether they are those of ``FINAL``, all of them kept, and no others: had they joined the rest, no seed would
+        draw what it drew before.
+
+    Returns
+    -------
+    list[str]
+    """
+    kinds = FINAL if final else {**OUTSIDE, **SEALED} if manner.background else OUTSIDE
     rng = np.random.default_rng(0)
     return [
         name
         for name, kind in kinds.items()
-        if (last or not kind.last) and holds(manner.world, unlike_neutral(kind.draw(rng, 1, 0.0)[0][0]))
+        if (last or final or not kind.last)
+        and holds(manner.world, unlike_neutral(kind.draw(rng, 1, 0.0)[0][0]))
     ]
 
 
 def _contents(
-    counts: Counts, rng: np.random.Generator, manner: Manner, last: bool
+    counts: Counts, rng: np.random.Generator, manner: Manner, drawable: Sequence[str]
 ) -> list[tuple[str, tuple[str, ...]]]:
     """Say what the cases of one world conceal."""
     hidden = SENSORS.get(manner.without, set())
     effects = [name for name, effect in EFFECTS.items() if hidden.isdisjoint(effect.needs)]
-    kinds = [name for name in outside_kinds(manner, last=last) if hidden.isdisjoint(ALL_OUTSIDE[name].needs)]
+    kinds = [name for name in drawable if hidden.isdisjoint(ALL_OUTSIDE[name].needs)]
     contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
     contents += [("single", (effect,)) for effect in _spread(effects, counts.single, rng)]
     for _ in range(counts.double):

@@ -279,9 +279,13 @@ def write_robot(folder: Path, base: Base) -> None:
 def seen_pose(
     history: History, concealed: Concealed, ticks: Ticks, late_s: float
 ) -> tuple[Array, Array, Array]:
-    """Pose as the camera has it: late, through its lens, from its slowly turning mount."""
+    """Pose as the camera has it: of its marker, late, through its lens, from its slowly turning mount."""
     times = history.time_s[ticks]
     pose = np.stack([np.interp(times - late_s, history.time_s, column) for column in history.pose.T])
+    ahead, left = concealed.marker
+    if (ahead, left) != (0.0, 0.0):
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        pose[:2] += [cos * ahead - sin * left, sin * ahead + cos * left]
     away = pose[:2] - np.array(FIELD)[:, None] / 2.0
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))
     turn = math.radians(concealed.pose_drift_deg) * times + math.radians(concealed.camera_turn_deg)

@@ -17,6 +17,7 @@ RESISTANCE = 5.50  # ohm
 SHAFT_INERTIA = 0.00248  # kg m^2
 SUPPLY = 8.67  # V
 DUTY_CAP = 0.80
+KNOT_S = 0.5  # s between two knots of a drive that wanders
 GRAVITY = 9.81  # m / s^2
 
 # Not in the nominal robot's file, and hardly felt: a 3D robot needs them, a planar one does not.
@@ -143,6 +144,22 @@ class Concealed:
     camera_bump: tuple[float, float, float, float] | None = None  # time [s], shift x, y [m], turn [rad]
     flicker: tuple[float, float, float] | None = None  # share, Hz, phase [rad]
     sway: tuple[float, float] | None = None  # Hz and damping ratio of the sensor's mount
+
+    # Outside the catalogue, from the third set of kinds.
+    axle_rub: float = 0.0  # dry friction between the two axles [N m]
+    strip: tuple[float, float, float, float] | None = None  # brake [N m], x, width [m], angle from +y [rad]
+    reversal_pause: float = 0.0  # s without drive before a motor turns the other way
+    toe: tuple[float, int] | None = None  # a wheel's heading against the chassis' [rad], side
+    trailer: tuple[float, float] | None = None  # drag of a weight on a string [N], length of the string [m]
+    twist: float = 0.0  # torque per turned heading of a cable from above [N m/rad]
+    keeper: tuple[float, float] | None = (
+        None  # integral of the speed's error: rate [1/s], most share of supply
+    )
+    wander: tuple[int, tuple[float, ...]] | None = None  # side, change of its drive at every half second
+    shadow: tuple[float, float, float, float] | None = (
+        None  # share of light lost, x, blur [m], way into it [rad]
+    )
+    marker: tuple[float, float] = (0.0, 0.0)  # where the camera's marker sits, ahead and left of the axle [m]
 
     # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
     inductance_scale: float = 1.0

@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.body import radii
+from benchmarks.concealed.colour_sensor import FIELD
 from benchmarks.concealed.history import TICK_S
 from benchmarks.concealed.robot import GRAVITY, Concealed
 
 _DRAG_BLEND = 0.02  # m/s: below this drags fade out, so that they cannot drive the robot
+_TWIST_SLIPS = 6.0  # rad: a cable from above slips in its clamp rather than winding up for ever
 _ROLLING_BLEND = 0.2  # rad/s: below this rolling resistance fades out, so that it cannot drive the robot
 
 
@@ -34,12 +36,17 @@ class Surroundings:
         self._geoms = {int(model.geom(side).id): index for index, side in enumerate(("left", "right"))}
         self._wheels = [int(model.geom_bodyid[geom]) for geom in self._geoms]
         self._radii = radii(concealed)
+        self._half_track = concealed.base.track_width * concealed.track_scale / 2.0
         self._scratch = np.zeros(6)
         drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
-        self._pushed = bool(concealed.tether or concealed.magnet or concealed.gusts or drags)
+        hauled = concealed.trailer or concealed.twist
+        self._pushed = bool(concealed.tether or concealed.magnet or concealed.gusts or drags or hauled)
+        self._braked = bool(concealed.rolling_resistance or concealed.strip)
         self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
-        self.idle = not (self._pushed or self._gripped or concealed.waves or concealed.rolling_resistance)
+        self.idle = not (self._pushed or self._gripped or concealed.waves or self._braked)
         self._rolled, self._castor = 0.0, math.nan  # way of the wheels [m], heading of a castor wheel [rad]
+        self._turned = 0.0  # since the recording began [rad]
+        self._weight: tuple[float, float] | None = None  # place of a weight on a string [m]
         shafts = [model.joint(side) for side in ("left", "right")]
         self._angle_at = [int(shaft.qposadr[0]) for shaft in shafts]
         self._speed_at = [int(shaft.dofadr[0]) for shaft in shafts]
@@ -67,12 +74,14 @@ class Surroundings:
             turn = 2.0 * math.pi / length
             self._lean(slope * math.sin(turn * x + phase_x), slope * math.sin(turn * y + phase_y))
         if self._pushed:
-            w, i, j, k = state.qpos[3:7]
-            heading = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
+            heading = _heading(state)
             force_x, force_y = self._push(x, y, state.qvel, time_s)
             drag_x, drag_y, turning = self._drag(heading, state.qvel)
+            if self._hidden.trailer is not None:
+                haul_x, haul_y, hauling = self._haul(x, y, heading)
+                drag_x, drag_y, turning = drag_x + haul_x, drag_y + haul_y, turning + hauling
             state.xfrc_applied[self._chassis] = [force_x + drag_x, force_y + drag_y, 0.0, 0.0, 0.0, turning]
-        if self._hidden.rolling_resistance > 0.0:
+        if self._braked:
             self._resist(state)
 
     def _lean(self, along_x: float, along_y: float) -> None:
@@ -107,6 +116,9 @@ class Surroundings:
         """Force [N] and torque [N m] on the chassis that depend on where it is heading."""
         hidden, force_x, force_y = self._hidden, 0.0, 0.0
         turning, rate = hidden.yaw_pull, float(velocity[5])
+        if hidden.twist > 0.0:
+            turning -= hidden.twist * self._turned / (1.0 + abs(self._turned) / _TWIST_SLIPS)
+            self._turned += TICK_S * rate
         if hidden.pile is not None:
             most, way = hidden.pile
             ahead = math.cos(heading) * velocity[0] + math.sin(heading) * velocity[1]
@@ -131,6 +143,23 @@ class Surroundings:
             turning += arm * side * math.cos(self._castor - heading)
         return force_x, force_y, turning
 
+    def _haul(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """Force [N] and torque [N m] of a weight that a string drags behind the caster; none while it is slack."""
+        most, length = self._hidden.trailer or (0.0, 1.0)
+        back = self._hidden.base.caster_ahead
+        hook_x, hook_y = x + back * math.cos(heading), y + back * math.sin(heading)
+        if self._weight is None:
+            self._weight = (hook_x - length * math.cos(heading), hook_y - length * math.sin(heading))
+        off_x, off_y = self._weight[0] - hook_x, self._weight[1] - hook_y
+        away = math.hypot(off_x, off_y)
+        if away <= length:
+            return 0.0, 0.0, 0.0
+        self._weight = (hook_x + off_x * length / away, hook_y + off_y * length / away)
+        pull = most * math.tanh((away - length) / TICK_S / _DRAG_BLEND) / away
+        force_x, force_y = pull * off_x, pull * off_y
+        arm = back - self._hidden.com_ahead
+        return force_x, force_y, arm * (math.cos(heading) * force_y - math.sin(heading) * force_x)
+
     def _push(
         self, x: float, y: float, velocity: npt.NDArray[np.float64], time_s: float
     ) -> tuple[float, float]:
@@ -154,13 +183,28 @@ class Surroundings:
         return float(force_x), float(force_y)
 
     def _resist(self, state: mujoco.MjData) -> None:
-        """Torque against each wheel's turning: coefficient x load x radius."""
+        """Torque against each wheel's turning: coefficient x load x radius, and what a sticky strip holds it with."""
         loads = self._loads(state)
+        sticking = self._sticking(state)
         axle = state.xmat[self._chassis].reshape(3, 3)[:, 1]
         turning = state.qvel[[6, -1]] if state.qvel.size == 8 else state.qvel[[6, 8]] + state.qvel[[7, 9]]
         for side, body in enumerate(self._wheels):
-            brake = self._hidden.rolling_resistance * loads[side] * self._radii[side]
+            brake = self._hidden.rolling_resistance * loads[side] * self._radii[side] + sticking[side]
             state.xfrc_applied[body, 3:] = -brake * math.tanh(turning[side] / _ROLLING_BLEND) * axle
+
+    def _sticking(self, state: mujoco.MjData) -> tuple[float, float]:
+        """Give the torque with which a strip across the floor holds each wheel that stands on it [N m]."""
+        if self._hidden.strip is None:
+            return 0.0, 0.0
+        most, strip_x, width, angle = self._hidden.strip
+        heading, half = _heading(state), self._half_track
+        held = []
+        for lever in (half, -half):
+            off_x = float(state.qpos[0]) - lever * math.sin(heading) - strip_x
+            off_y = float(state.qpos[1]) + lever * math.cos(heading) - FIELD[1] / 2.0
+            across = math.cos(angle) * off_x + math.sin(angle) * off_y
+            held.append(most if abs(across) < width / 2.0 else 0.0)
+        return held[0], held[1]
 
     def _loads(self, state: mujoco.MjData) -> list[float]:
         """Read the normal force under the left and the right wheel in the step before [N]."""
@@ -171,3 +215,9 @@ class Surroundings:
                 mujoco.mj_contactForce(self._model, state, index, self._scratch)
                 loads[side] += self._scratch[0]
         return loads
+
+
+def _heading(state: mujoco.MjData) -> float:
+    """Heading of the chassis [rad], wrapped."""
+    w, i, j, k = state.qpos[3:7]
+    return math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))

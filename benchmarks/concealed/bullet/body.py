@@ -93,7 +93,7 @@ def build(client: int, concealed: Concealed) -> Body:
         linkInertialFrameOrientations=[[0.0, 0.0, 0.0, 1.0]] * 4,
         linkParentIndices=[0, 1, 0, 3],
         linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE] * 2,
-        linkJointAxis=[[0.0, 1.0, 0.0]] * 4,
+        linkJointAxis=[across for axle in _axles(concealed) for across in ([0.0, 1.0, 0.0], axle)],
         physicsClientId=client,
     )
     _freed(client, robot)
@@ -113,6 +113,14 @@ def build(client: int, concealed: Concealed) -> Body:
     for link, inertia in inertias.items():
         pybullet.changeDynamics(robot, link, localInertiaDiagonal=inertia, physicsClientId=client)
     return Body(robot, (-ahead, 0.0, -up), height)
+
+
+def _axles(concealed: Concealed) -> list[list[float]]:
+    """Give the directions of the left and the right wheel's axle in the chassis' frame."""
+    toes = [0.0, 0.0]
+    if concealed.toe is not None:
+        toes[concealed.toe[1]] = concealed.toe[0]
+    return [[0.0 - math.sin(toe), math.cos(toe), 0.0] for toe in toes]
 
 
 def _freed(client: int, body: int) -> None:

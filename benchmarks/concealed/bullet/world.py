@@ -103,14 +103,19 @@ class _Robot:
         self._settle(start)
         self._train, self._memory = np.zeros(drive.SIZE), np.zeros(chassis.SIZE)
         self._train[drive.TERMINAL] = concealed.base.supply * concealed.supply_scale
-        self._memory[chassis.CASTOR] = start[2]
+        self._memory[:] = chassis.start(numbers(concealed), *start)
         self._grips = [concealed.tyre_friction] * 2
         self._look()
         self._origin = self._angles
         self._lean(*concealed.tilt)
         still = (concealed.air_drag, concealed.yaw_pull) == (0.0, 0.0)
-        pulls = (concealed.tether, concealed.magnet, concealed.pile, concealed.swivel)
-        self._pushed = not still or bool(concealed.gusts) or any(pull is not None for pull in pulls)
+        pulls = (concealed.tether, concealed.magnet, concealed.pile, concealed.swivel, concealed.trailer)
+        self._pushed = (
+            not still
+            or concealed.twist > 0.0
+            or bool(concealed.gusts)
+            or any(pull is not None for pull in pulls)
+        )
         self.yaw_rate = 0.0
 
     @property
@@ -145,7 +150,7 @@ class _Robot:
         velocity, rates = pybullet.getBaseVelocity(self._body.robot, physicsClientId=self._client)
         shares, tick_s = np.array(duties), TICK_S / _STEPS / _DRIVE_STEPS
         self._surround(n, x, y)
-        brakes, push = self._brakes(n), (0.0, 0.0, 0.0)
+        brakes, push = self._brakes(n, x, y, turn), (0.0, 0.0, 0.0)
         if self._pushed:
             # The stated velocity is that of the chassis' centre of mass.
             back = self._body.axle[0]
@@ -227,17 +232,18 @@ class _Robot:
                     self._body.robot, link, lateralFriction=grip, physicsClientId=self._client
                 )
 
-    def _brakes(self, n: Numbers) -> Array:
-        """Give the tyres' rolling resistance [N m]: coefficient x load x radius."""
+    def _brakes(self, n: Numbers, x: float, y: float, turn: float) -> Array:
+        """Give what holds the tyres [N m]: rolling resistance (coefficient x load x radius) and a sticky strip."""
         brakes = np.zeros(2)
-        if n.rolling == 0.0:
+        if (n.rolling, n.strip) == (0.0, 0.0):
             return brakes
         for side, radius in enumerate((n.radius_left, n.radius_right)):
             touching = pybullet.getContactPoints(
                 self._body.robot, linkIndexA=WHEELS[side], physicsClientId=self._client
             )
             load = sum(contact[9] for contact in touching)
-            brakes[side] = n.rolling * load * radius * math.tanh(self._speeds[side] / _ROLLING_BLEND)
+            holding = n.rolling * load * radius + chassis.sticking(n, side, x, y, turn)
+            brakes[side] = holding * math.tanh(self._speeds[side] / _ROLLING_BLEND)
         return brakes
 
     def _push(self, push: tuple[float, float, float]) -> None:

@@ -15,9 +15,20 @@ from benchmarks.concealed.robot import CASTER_RADIUS, GRAVITY, WHEEL_MASS
 # State: place and velocity of the centre of mass [m, m/s], heading and its rate [rad, rad/s], wheels' angles and speeds
 # [rad, rad/s], deflections of both treads and of the caster's contact, ahead and left [m], of the tyres' flexing
 # [rad], force of the floor in the step before, ahead and left [N], way rolled [m], heading of a castor wheel [rad],
-# and for how long a contact has been lifted [s].
+# for how long a contact has been lifted [s], angle turned since the start [rad], place of a weight on a string [m].
 X, Y, TURN, VX, VY, RATE, WHEEL, WHEEL_SPEED = 0, 1, 2, 3, 4, 5, 6, 8
-TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, SIZE = 10, 14, 16, 18, 20, 21, 22, 23
+TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, SIZE = (
+    10,
+    14,
+    16,
+    18,
+    20,
+    21,
+    22,
+    23,
+    24,
+    26,
+)
 
 # Brush tyre with a first-order relaxation of the contact (Pacejka, Tire and Vehicle Dynamics, 3rd ed., ch. 3 and 7).
 # Slip stiffness over load is 10-30 for cars; a small solid tyre under a newton is stiffer.
@@ -29,6 +40,7 @@ _BALL_SLIDES = 0.0002  # m
 _FLEX_SLIDES = 0.01  # rad
 _LOAD_FOLLOWS = 0.002  # s: loads follow the floor's forces as quickly as tyres settle
 _DRAG_BLEND = 0.02  # m / s
+_TWIST_SLIPS = 6.0  # rad
 _RIDGE_RADIUS = 0.20  # m, of the lying cylinder whose cap is the ridge
 STEPS = 10  # of a tick: 0.1 ms; halving it moves nothing that a sensor sees
 
@@ -102,21 +114,23 @@ def _step_body(
         lever = n.half_track if side == 0 else -n.half_track
         radius, rise = _shape(n, side, b[WHEEL + side])
         rolling = ahead - b[RATE] * lever
-        slip_x = rolling - radius * b[WHEEL_SPEED + side]
-        slip_y = left - b[RATE] * n.com_ahead
+        toe = n.toe if n.toe_side == side else 0.0
+        slip_x, slip_y = turned(rolling, left - b[RATE] * n.com_ahead, -toe)
+        slip_x -= radius * b[WHEEL_SPEED + side]
         holding = grip(n, b, side, axle_x, axle_y)
         tread = b[TREAD + 2 * side : TREAD + 2 * side + 2]
         push_x, push_y = _tyre(
             n, tread, slip_x, slip_y, radius * b[WHEEL_SPEED + side], holding, loads[side], dt
         )
         inertia = 0.5 * WHEEL_MASS * radius * radius
-        brake = (
-            _dahl(b, FLEX + side, b[WHEEL_SPEED + side], _FLEX_SLIDES, dt) * n.rolling * loads[side] * radius
-        )
+        flexed = _dahl(b, FLEX + side, b[WHEEL_SPEED + side], _FLEX_SLIDES, dt)
+        brake = flexed * n.rolling * loads[side] * radius
+        brake += flexed * sticking(n, side, axle_x, axle_y, b[TURN])
         # A wheel that lifts its axle as it turns is held back by its load.
         turning = torques[side] - radius * push_x - brake - loads[side] * rise
         b[WHEEL_SPEED + side] += dt * turning / inertia
         b[WHEEL + side] += dt * b[WHEEL_SPEED + side]
+        push_x, push_y = turned(push_x, push_y, toe)
         force_ahead += push_x
         force_left += push_y
         torque += -lever * push_x - n.com_ahead * push_y
@@ -142,6 +156,14 @@ def _step_body(
     )
     force_x, force_y, torque = force_x + push_x, force_y + push_y, torque + push_turn
 
+    _move(n, b, force_x, force_y, torque, dt)
+
+
+@numba.njit(cache=True)
+def _move(
+    n: Numbers, b: npt.NDArray[np.float64], force_x: float, force_y: float, torque: float, dt: float
+) -> None:
+    """Advance the body under the forces [N] at, and the torque [N m] about, its centre of mass."""
     b[VX] += dt * force_x / n.mass
     b[VY] += dt * force_y / n.mass
     b[RATE] += dt * torque / n.yaw_inertia
@@ -149,6 +171,43 @@ def _step_body(
     b[Y] += dt * b[VY]
     b[TURN] += dt * b[RATE]
     b[ROLLED] += dt * (abs(b[WHEEL_SPEED]) + abs(b[WHEEL_SPEED + 1])) * n.radius_left / 2.0
+
+
+@numba.njit(cache=True)
+def turned(x: float, y: float, angle: float) -> tuple[float, float]:
+    """Turn a vector counter-clockwise [rad]."""
+    if angle == 0.0:
+        return x, y
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@numba.njit(cache=True)
+def sticking(n: Numbers, side: int, x: float, y: float, turn: float) -> float:
+    """Give the torque with which a strip across the floor holds a wheel that stands on it [N m]."""
+    if n.strip == 0.0:
+        return 0.0
+    off_x, off_y = turned(0.0, n.half_track if side == 0 else -n.half_track, turn)
+    across, _ = turned(x + off_x - n.strip_x, y + off_y - 0.6, -n.strip_angle)
+    return n.strip if abs(across) < n.strip_width / 2.0 else 0.0
+
+
+@numba.njit(cache=True)
+def _haul(
+    n: Numbers, b: npt.NDArray[np.float64], x: float, y: float, turn: float, dt: float
+) -> tuple[float, float, float]:
+    """Drag a weight on a string along; give its pull [N] and the torque about the centre of mass [N m]."""
+    arm_x, arm_y = turned(n.caster, 0.0, turn)
+    string_x, string_y = b[WEIGHT] - x - arm_x, b[WEIGHT + 1] - y - arm_y
+    over = math.hypot(string_x, string_y) - n.trailer_length
+    if over <= 0.0:  # slack
+        return 0.0, 0.0, 0.0
+    way_x, way_y = string_x / (over + n.trailer_length), string_y / (over + n.trailer_length)
+    b[WEIGHT] -= over * way_x
+    b[WEIGHT + 1] -= over * way_y
+    pull = n.trailer * math.tanh(over / dt / _DRAG_BLEND)
+    _, across = turned(way_x, way_y, -turn)
+    return pull * way_x, pull * way_y, (n.caster - n.com_ahead) * pull * across
 
 
 @numba.njit(cache=True)
@@ -285,12 +344,13 @@ def pushes(
     time_s: float,
     dt: float,
 ) -> tuple[float, float, float]:
-    """Force [N] at, and torque [N m] about, the centre of mass from cables, magnets, air and pile.
+    """Force [N] at, and torque [N m] about, the centre of mass from cables, magnets, air, pile and a weight.
 
     Parameters
     ----------
     n, b
-        The robot and its state, of which only a castor wheel's heading is used.
+        The robot and its state, of which only a castor wheel's heading, the angle turned and a weight on a string
+        are used.
     x, y, turn
         Pose of the axle's centre [m, m, rad].
     vx, vy, rate
@@ -333,6 +393,11 @@ def pushes(
         force_x -= side * math.sin(b[CASTOR])
         force_y += side * math.cos(b[CASTOR])
         torque += (n.caster - n.com_ahead) * side * math.cos(b[CASTOR] - turn)
+    torque -= n.twist * b[TURNED] / (1.0 + abs(b[TURNED]) / _TWIST_SLIPS)
+    b[TURNED] += dt * rate
+    if n.trailer > 0.0:
+        haul_x, haul_y, hauling = _haul(n, b, x, y, turn, dt)
+        force_x, force_y, torque = force_x + haul_x, force_y + haul_y, torque + hauling
     return force_x, force_y, torque
 
 
@@ -342,6 +407,8 @@ def start(n: Numbers, x: float, y: float, turn: float) -> npt.NDArray[np.float64
     b = np.zeros(SIZE)
     b[X], b[Y] = x + n.com_ahead * math.cos(turn), y + n.com_ahead * math.sin(turn)
     b[TURN] = b[CASTOR] = turn
+    back = n.caster - n.trailer_length  # a weight on a string lies straight behind
+    b[WEIGHT], b[WEIGHT + 1] = x + back * math.cos(turn), y + back * math.sin(turn)
     return b
 
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from benchmarks.concealed.continuous.numbers import Numbers
 
 # State: currents [A], shaft speeds [rad/s], shaft angles [rad], bristle deflections [rad], left and right; then the
-# voltage of the battery's slow branch [V] and the voltage at its terminals [V].
-CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, SIZE = 0, 2, 4, 6, 8, 9, 10
+# voltage of the battery's slow branch [V], the voltage at its terminals [V] and what the firmware adds to both duties.
+CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT, SIZE = 0, 2, 4, 6, 8, 9, 10, 12
 
 # Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
 GEAR_STIFFNESS = 40.0  # N m / rad
@@ -28,6 +28,7 @@ _SLOW_TIME = 1.0  # s
 _LIMITER = 20.0  # V s / rad
 _BAND_SLIPS = 10.0  # rad
 _DRAG_BLEND = 0.2  # rad / s
+_RUB_BLEND = 0.5  # rad / s
 
 
 @numba.njit(cache=True)
@@ -60,16 +61,19 @@ def step_drive(
     torques
         Receives the gears' torques on the wheels (2,) [N m].
     """
-    drawn = duties[0] * d[CURRENT] + duties[1] * d[CURRENT + 1]
+    left, right = _keep(n, d, 0, duties[0], dt), _keep(n, d, 1, duties[1], dt)
+    drawn = left * d[CURRENT] + right * d[CURRENT + 1]
     source = n.supply - n.drain * time_s
     terminal = source - (1.0 - _SLOW_SHARE) * n.inner_resistance * drawn - d[SLOW]
     d[SLOW] += dt / _SLOW_TIME * (_SLOW_SHARE * n.inner_resistance * drawn - d[SLOW])
     d[TERMINAL] = terminal
+    rub = n.axle_rub * math.tanh((d[SPEED] - d[SPEED + 1]) / _RUB_BLEND)
     for side in range(2):
         speed, angle = d[SPEED + side], d[ANGLE + side]
-        torque = _motor(n, d, side, duties[side], terminal, time_s, dt)
+        torque = _motor(n, d, side, left if side == 0 else right, terminal, time_s, dt)
         torque += _cogs(n, side, speed, angle)
         torque -= _friction(n, d, side, speed, dt) + n.viscous * speed
+        torque -= rub if side == 0 else -rub
         play = n.play + (n.loosening_left if side == 0 else n.loosening_right) * time_s
         gear = _gear(play / 2.0, angle - wheel_angles[side], speed - wheel_speeds[side])
         d[SPEED + side] += dt * (torque - gear) / n.shaft_inertia
@@ -106,6 +110,17 @@ def drive_on(
         step_drive(n, d, duties, angles, wheel_speeds, time_s + tick_s * step, dt, torques)
         total += torques
     return total / steps
+
+
+@numba.njit(cache=True)
+def _keep(n: Numbers, d: npt.NDArray[np.float64], side: int, duty: float, dt: float) -> float:
+    """Advance the integral of the speed that one motor lacks, none at duty 0; give the duty that acts."""
+    if n.keeper == 0.0:
+        return duty
+    wanted = duty * n.nominal_supply / n.back_emf
+    step = dt * n.keeper * (wanted - d[SPEED + side]) * n.back_emf / n.nominal_supply
+    d[KEPT + side] = min(max(d[KEPT + side] + step, -n.keeper_most), n.keeper_most) if duty != 0.0 else 0.0
+    return min(max(duty + d[KEPT + side], -1.0), 1.0)
 
 
 @numba.njit(cache=True)

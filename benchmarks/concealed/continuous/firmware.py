@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from benchmarks.concealed.history import TICK_S
-from benchmarks.concealed.robot import DUTY_CAP, Concealed
+from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 
 
 class Firmware:
-    """Delay, ramp, rounding, cap and dead band, in this order, once a tick.
+    """Delay, ramp, pause, rounding, cap, dead band and what wanders, in this order, once a tick.
 
     Parameters
     ----------
@@ -22,6 +24,8 @@ class Firmware:
         self._issued: list[tuple[float, float]] = []
         self._late = round(concealed.actuation_delay / TICK_S)
         self._now = [0.0, 0.0]
+        # By motor: the way it was driven last, and when that ended.
+        self._last: list[tuple[float, float]] = [(0.0, -math.inf)] * 2
         self._known: dict[tuple[float, float], tuple[float, float]] = {}
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
@@ -49,9 +53,27 @@ class Firmware:
                 step = wanted - self._now[side]
                 self._now[side] = wanted if abs(step) <= most else self._now[side] + math.copysign(most, step)
             acting = (self._now[0], self._now[1])
+        if hidden.reversal_pause > 0.0:
+            acting = self._rested(0, acting[0], time_s), self._rested(1, acting[1], time_s)
         if acting not in self._known:
             self._known[acting] = self._bridged(*acting)
-        return self._known[acting]
+        shares = self._known[acting]
+        if hidden.wander is None:
+            return shares
+        side, knots = hidden.wander
+        gains = [1.0, 1.0]
+        gains[side] += float(np.interp(time_s, KNOT_S * np.arange(len(knots)), knots))
+        return shares[0] * gains[0], shares[1] * gains[1]
+
+    def _rested(self, side: int, duty_pct: float, time_s: float) -> float:
+        """Let a motor turn round only when it has rested."""
+        way, until = self._last[side]
+        turned = duty_pct * way < 0.0
+        if turned and time_s < until + self._hidden.reversal_pause:
+            return 0.0
+        if duty_pct != 0.0:
+            self._last[side] = (math.copysign(1.0, duty_pct), time_s)
+        return duty_pct
 
     def _bridged(self, left_pct: float, right_pct: float) -> tuple[float, float]:
         """Give both motors' shares of the voltage."""

@@ -102,6 +102,19 @@ class Numbers(NamedTuple):
     yaw_pull: float
     swivel: float
     swivel_trail: float
+    axle_rub: float
+    strip: float
+    strip_x: float
+    strip_width: float
+    strip_angle: float
+    toe: float
+    toe_side: float
+    trailer: float
+    trailer_length: float
+    twist: float
+    keeper: float
+    keeper_most: float
+    nominal_supply: float
 
 
 def numbers(concealed: Concealed) -> Numbers:
@@ -133,6 +146,8 @@ def numbers(concealed: Concealed) -> Numbers:
     if concealed.loosening is not None:
         loosening[concealed.loosening[1]] = concealed.loosening[0]
     pile, swivel = concealed.pile or (0.0, 0.0), concealed.swivel or (0.0, 1.0)
+    strip, toe = concealed.strip or (0.0, 0.0, 0.0, 0.0), concealed.toe or (0.0, 0)
+    trailer, keeper = concealed.trailer or (0.0, 1.0), concealed.keeper or (0.0, 0.0)
     fields = {
         "mass": base.mass,
         "yaw_inertia": base.yaw_inertia,
@@ -217,6 +232,19 @@ def numbers(concealed: Concealed) -> Numbers:
         "yaw_pull": concealed.yaw_pull,
         "swivel": swivel[0],
         "swivel_trail": swivel[1],
+        "axle_rub": concealed.axle_rub,
+        "strip": strip[0],
+        "strip_x": strip[1],
+        "strip_width": strip[2],
+        "strip_angle": strip[3],
+        "toe": toe[0],
+        "toe_side": toe[1],
+        "trailer": trailer[0],
+        "trailer_length": trailer[1],
+        "twist": concealed.twist,
+        "keeper": keeper[0],
+        "keeper_most": keeper[1],
+        "nominal_supply": base.supply,
     }
     return Numbers(**{name: float(number) for name, number in fields.items()})
 
