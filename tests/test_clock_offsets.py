@@ -13,7 +13,9 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.problem import scattered
+from gecar.reality.selection.problem import Problem, problem_of, scattered
+from gecar.reality.selection.stepwise import explain
+from gecar.world.robot import Robot
 
 
 def late(run: Recording, by_s: float) -> Recording:
@@ -26,8 +28,8 @@ def late(run: Recording, by_s: float) -> Recording:
     return replace(run, **shown)
 
 
-def beside(*offsets_s: float) -> Residuals:
-    runs = [late(recorded(EV3, seed), offset) for seed, offset in enumerate(offsets_s)]
+def beside(*offsets_s: float, robot: Robot = EV3) -> Residuals:
+    runs = [late(recorded(robot, seed), offset) for seed, offset in enumerate(offsets_s)]
     return motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
 
 
@@ -48,3 +50,20 @@ def test_one_delay_common_to_all_is_no_scatter() -> None:
     assert not scattered(np.array([0.03, 0.03, 0.0305]))
     assert not scattered(np.array([0.03]))
     assert scattered(np.array([0.03, -0.03]))
+
+
+def test_clocks_fitted_before_an_effect_was_known_are_fitted_anew_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A heavier rotor makes the robot late, which clocks take for theirs as long as no effect is known."""
+    offsets = [0.03, -0.03, 0.025, -0.025, 0.02]
+    heavy = EV3.with_effects({"rotor_inertia": {"scale": 1.12}})
+    problem = problem_of(beside(*offsets, robot=heavy), EV3, ("rotor_inertia", "viscous_friction"))
+    explained = explain(problem)
+    (step,) = explained.steps
+    assert step.effect == "rotor_inertia"
+    assert explained.problem.clocks_fitted
+    assert explained.problem.residuals.clock_offsets_s == pytest.approx(offsets, abs=0.001)
+    monkeypatch.setattr(Problem, "with_clocks_beside", lambda *_: None)
+    once = explain(problem).problem.residuals.clock_offsets_s
+    assert float(np.mean(once - offsets)) > 0.003

@@ -30,6 +30,8 @@ RIPPLE = "torque_ripple"
 LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
 PROBE = 0.4  # of a size worth a name: step of finite differences by small changes
 REFINEMENTS = 2  # of small changes, by derivatives taken anew
+RENEWALS = 4  # of camera clocks, beside effects, at most
+CONVERGED = 0.5  # gain in log-likelihood from which on they are fitted once more
 COMMON_DELAY = "pose_delay"  # the effect that camera clocks late by the same time are
 
 
@@ -275,9 +277,29 @@ class Problem:
         if before - after < least or not (alone or scattered(fitted.clock_offsets_s)):
             return None
         self.tell("the camera's clock differs from recording to recording: its offsets are fitted")
-        estimator = Estimator(fitted, self.estimator.robot, self.estimator.rng)
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        return replace(self._anew(estimator), catalogue=others, clocks_fitted=True)
+        return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
+
+    def with_clocks_beside(self, model: Model) -> Problem | None:
+        """Return the problem with its camera clocks fitted anew beside a model's effects; None where that gains little.
+
+        Fitted before an effect was known, clocks have taken up a part of it.
+        """
+        if not (self.clocks_fitted and model.effects) or self.residuals.sensor:
+            return None
+        problem, now = self, self.estimator.cost_of(self.residuals.errors(model.physics))
+        before = now
+        for _ in range(RENEWALS):
+            problem = problem._on(with_fitted_clocks(problem.residuals, model.physics)[0])
+            model = problem.estimator.fit(model.effects, model.values)
+            was, now = now, self.estimator.cost_of(problem.residuals.errors(model.physics))
+            if was - now < CONVERGED:
+                break
+        return problem if before - now >= PRICE else None
+
+    def _on(self, residuals: Residuals) -> Problem:
+        """Return the problem of other residuals, with nothing known of their discrepancy."""
+        return self._anew(Estimator(residuals, self.estimator.robot, self.estimator.rng))
 
 
 def problem_of(

@@ -89,7 +89,8 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     """Take effects one by one as long as each proves itself; abstain where they only imitate.
 
     Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes. That is
-    half the time, and not done ``once_more`` where recordings are explained without what was refused or an instrument.
+    half the time, and not done ``once_more`` where recordings are explained without what was refused or an instrument,
+    or with the camera's clocks fitted anew, as before the effects were known these took up a part of them.
     """
     known = problem.under(problem.known)
     first = candidate_steps(known, known.known)
@@ -105,6 +106,9 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     best = _best_chain(problem, [chain, *others])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
+    renewed = None if once_more else problem.under(model).with_clocks_beside(model)
+    if renewed is not None:
+        return explain(renewed, once_more=True)
     return concluded(problem, model, steps, tried)
 
 
