@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command import Command
+from support.command import Command
 
 from gecar.compiled import is_cold, mark_warm
 from gecar.reality.residuals import compilation, threads

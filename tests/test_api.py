@@ -167,10 +167,11 @@ def test_a_notebook_shows_drives_runs_and_courses():
 
 
 def test_a_notebook_shows_recordings_with_and_without_a_camera():
+    from support.synthetic import drive
+
     from gecar.plots.reality.recording import recording_figure
     from gecar.plots.style import is_whole
     from gecar.reality.recordings.recording import make_recording
-    from tests.synthetic import drive
 
     seen = drive(seconds=3.0)
     columns = {"t_s": seen.t_s, "left_duty_pct": 50.0 + 0.0 * seen.t_s, "right_duty_pct": 0.0 * seen.t_s}

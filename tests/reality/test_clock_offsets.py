@@ -1,0 +1,69 @@
+"""Camera clocks that are late by another time in every recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.concealing import EV3, recorded
+
+from gecar.reality.fitting.clock_offsets import with_fitted_clocks
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Recording
+from gecar.reality.residuals.of_case import Residuals, motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.problem import Problem, problem_of, scattered
+from gecar.reality.selection.stepwise import explain
+from gecar.world.robot import Robot
+
+
+def late(run: Recording, by_s: float) -> Recording:
+    """Let a camera show where the robot was a while ago."""
+    seen = ~np.isnan(run.x_m)
+    shown = {
+        name: np.where(seen, np.interp(run.t_s - by_s, run.t_s[seen], getattr(run, name)[seen]), np.nan)
+        for name in ("x_m", "y_m", "heading_rad")
+    }
+    return replace(run, **shown)
+
+
+def beside(*offsets_s: float, robot: Robot = EV3) -> Residuals:
+    runs = [late(recorded(robot, seed), offset) for seed, offset in enumerate(offsets_s)]
+    return motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+
+
+def test_offsets_come_back_of_residuals_nothing_was_asked_of_before() -> None:
+    """Recordings set aside are fitted first of all: their index must not depend on an earlier replay."""
+    fitted, cost = with_fitted_clocks(beside(0.03, -0.03), EV3.physics)
+    assert fitted.clock_offsets_s == pytest.approx([0.03, -0.03], abs=0.003)
+    assert cost < 0.5 * np.sum(beside(0.03, -0.03).errors(EV3.physics) ** 2)
+
+
+def test_the_residuals_given_stay_as_they_are() -> None:
+    before = beside(0.03, -0.03)
+    with_fitted_clocks(before, EV3.physics)
+    assert before.clock_offsets_s.tolist() == [0.0, 0.0]
+
+
+def test_one_delay_common_to_all_is_no_scatter() -> None:
+    assert not scattered(np.array([0.03, 0.03, 0.0305]))
+    assert not scattered(np.array([0.03]))
+    assert scattered(np.array([0.03, -0.03]))
+
+
+def test_clocks_fitted_before_an_effect_was_known_are_fitted_anew_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A heavier rotor makes the robot late, which clocks take for theirs as long as no effect is known."""
+    offsets = [0.03, -0.03, 0.025, -0.025, 0.02]
+    heavy = EV3.with_effects({"rotor_inertia": {"scale": 1.12}})
+    problem = problem_of(beside(*offsets, robot=heavy), EV3, ("rotor_inertia", "viscous_friction"))
+    explained = explain(problem)
+    (step,) = explained.steps
+    assert step.effect == "rotor_inertia"
+    assert explained.problem.clocks_fitted
+    assert explained.problem.residuals.clock_offsets_s == pytest.approx(offsets, abs=0.001)
+    monkeypatch.setattr(Problem, "with_clocks_beside", lambda *_: None)
+    once = explain(problem).problem.residuals.clock_offsets_s
+    assert float(np.mean(once - offsets)) > 0.003

@@ -1,0 +1,119 @@
+"""Intervals: as long as few recordings and flat valleys ask for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+from support.concealing import EV3, recorded
+from support.linear_case import bumps, linear, linear_problem
+
+from gecar.reality import discovery
+from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import free
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.problem import Problem, problem_of
+from gecar.reality.selection.stepwise import explain
+from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, intervals
+from gecar.reality.verdict import Interval
+from gecar.world.effects import BY_ID
+
+VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
+SIZE = BY_ID[VISCOUS].parameters[0].worthwhile
+
+
+def fitted(problem: Problem, *effects: str) -> Model:
+    return problem.estimator.fit(effects, {})
+
+
+def test_intervals_of_four_recordings_hold_the_truth_as_often_as_they_say() -> None:
+    held = []
+    for seed in range(200):
+        problem = linear_problem(linear({VISCOUS: 5.0}, {VISCOUS: bumps(1, 4, 0.2)}, seed))
+        model = fitted(problem, VISCOUS)
+        held.append(abs(model.z[0] - 5.0) < half_widths(problem.estimator, model)[0])
+    assert np.mean(held) > 0.92
+
+
+def test_where_recordings_disagree_few_of_them_widen_an_interval_by_student_s_t() -> None:
+    """One recording says 5, the other three 4: with three degrees of freedom, 3.18 standard errors, not 1.96."""
+    problem = linear_problem(linear({VISCOUS: 4.0}, {VISCOUS: np.tile(bumps(1, 1, 1.0), 4)}))
+    residuals = problem.residuals
+    noise = residuals.noise.copy()  # type: ignore[attr-defined]
+    noise[:600] += residuals.responses[VISCOUS][:600]  # type: ignore[attr-defined]
+    problem = linear_problem(type(residuals)(residuals.responses, residuals.truth, noise, 4))  # type: ignore[attr-defined]
+    model = fitted(problem, VISCOUS)
+    estimates = np.array([5.0, 4.0, 4.0, 4.0])
+    expected = student.ppf(0.975, 3) * np.std(estimates, ddof=1) / 2.0
+    assert half_widths(problem.estimator, model)[0] == pytest.approx(expected, rel=0.15)
+
+
+def test_a_profile_refits_the_others() -> None:
+    """Two effects that nearly do the same: each alone is known to nothing, whatever the other is held at."""
+    nearly = {VISCOUS: bumps(1, 4, 0.3), INERTIA: bumps(1, 4, 0.3) + 1e-3 * bumps(2, 4, 1.0)}
+    problem = linear_problem(linear({VISCOUS: 10.0}, nearly))
+    model = fitted(problem, VISCOUS, INERTIA)
+    found = intervals(problem.estimator, model)[VISCOUS]["coefficient_nms"]
+    assert found.low / SIZE < 6.0
+    assert found.high / SIZE > 14.0
+
+
+def test_an_interval_that_contains_neutral_is_told() -> None:
+    for size, contained in ((0.0, True), (6.0, False)):
+        problem = linear_problem(linear({VISCOUS: size}, {VISCOUS: bumps(1, 4, 1.0)}))
+        model = fitted(problem, VISCOUS)
+        assert contains_neutral(model, VISCOUS, intervals(problem.estimator, model)) is contained
+
+
+@pytest.mark.parametrize(
+    ("low", "grip", "named"), [(0.04, 0.8, True), (0.03, 0.8, False), (0.03, 0.4, True), (0.0, 0.5, False)]
+)
+def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: float, named: bool) -> None:
+    model = SimpleNamespace(parameters=free(EV3, ["slippery_patch"]))
+    spans = {label: Interval(1.0, 0.9, 1.1, "m") for label in ("x_m", "y_m")}
+    spans |= {"radius_m": Interval(0.08, low, 0.1, "m"), "coefficient": Interval(0.1, 0.1, grip, "-")}
+    assert contains_neutral(model, "slippery_patch", {"slippery_patch": spans}) is not named  # type: ignore[arg-type]
+
+
+def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    truth, responses = {VISCOUS: 3.0, TRACK: 4.0}, {VISCOUS: bumps(1, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
+    held: Any = linear(truth, responses, seed=5)
+    proof = confirmed(explain(linear_problem(linear(truth, responses))), held)
+    assert {step.effect for step in proof.explained.steps} == {VISCOUS, TRACK}
+
+    def wide(*given: object) -> dict:
+        spans = intervals(*given)  # type: ignore[arg-type]
+        for label, span in spans.get(VISCOUS, {}).items():
+            spans[VISCOUS][label] = replace(span, low=0.0)
+        return spans
+
+    monkeypatch.setattr(discovery, "intervals", wide)
+    stage = discovery._with_intervals(SimpleNamespace(tell=print, seed=0), proof, held)  # type: ignore[arg-type]
+    assert [step.effect for step in stage.explained.steps] == [TRACK]
+    assert stage.explained.taken.effects == (TRACK,)
+    assert [step.effect for step in stage.candidates] == [VISCOUS]
+
+
+def test_the_interval_of_a_patch_holds_the_truth_and_follows_the_seed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where derivatives say nothing, a random walk does; short here."""
+    monkeypatch.setattr("gecar.reality.uncertainty.mcmc.STEPS", 800)
+    patch = {"x_m": 1.05, "y_m": 0.52, "radius_m": 0.1, "coefficient": 0.08}
+    runs = [recorded(EV3.with_effects({"slippery_patch": patch}), k, seconds=4.0) for k in range(2)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    estimator = problem_of(residuals, EV3, ("slippery_patch",)).estimator
+    model = estimator.fit(("slippery_patch",), {"slippery_patch": patch})
+    found = intervals(estimator, model, seed=1)["slippery_patch"]
+    assert all(found[name].low < value < found[name].high for name, value in patch.items())
+    assert intervals(estimator, model, seed=1)["slippery_patch"] == found
+    assert intervals(estimator, model, seed=2)["slippery_patch"] != found

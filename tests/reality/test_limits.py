@@ -1,0 +1,57 @@
+"""Limits: what recordings must show of an effect for it to be named, on residuals that are linear in effects."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.linear_case import bumps, linear, linear_problem
+
+from gecar.reality.uncertainty.limits import limits
+
+VISCOUS, DRY = "viscous_friction", "coulomb_friction"
+OWN, OTHER = 0.3 * bumps(1, 4, 1.0), 0.3 * bumps(2, 4, 1.0)
+HELD = 0.3 * bumps(3, 2, 1.0)
+
+
+def limit_of(responses, held, errors_of_held=1.0):
+    """Return the limit of viscous friction, where recordings set aside respond, and are off, in this way."""
+    problem = linear_problem(linear({}, responses))
+    aside = linear({}, {VISCOUS: held}, seed=5, count=2)
+    aside = replace(aside, noise=errors_of_held * aside.noise)
+    under = problem.under(problem.known)
+    return limits(under, under.known, aside)[VISCOUS]
+
+
+def test_an_effect_that_is_faint_has_a_larger_limit():
+    strong, weak = (limit_of({VISCOUS: k * OWN}, k * HELD).size for k in (1.0, 0.5))
+    assert weak > 1.3 * strong
+
+
+def test_what_another_effect_makes_up_for_has_a_larger_limit():
+    alone = limit_of({VISCOUS: OWN}, HELD).size
+    beside = limit_of({VISCOUS: OWN, DRY: OTHER}, HELD).size
+    imitated = limit_of({VISCOUS: OWN, DRY: OWN + 0.05 * OTHER}, HELD).size
+    assert beside == pytest.approx(alone, rel=0.2)
+    assert imitated > 1.5 * alone
+
+
+def test_what_another_effect_does_alike_has_no_limit():
+    assert limit_of({VISCOUS: OWN, DRY: OWN}, HELD) is None
+
+
+def test_what_recordings_set_aside_show_faintly_has_a_larger_limit():
+    clear, faint = (limit_of({VISCOUS: OWN}, HELD, off).size for off in (1.0, 12.0))
+    assert faint > 1.5 * clear
+
+
+def test_without_recordings_set_aside_only_those_fitted_count():
+    problem = linear_problem(linear({}, {VISCOUS: OWN}))
+    under, none = problem.under(problem.known), linear({}, {}, count=2)
+    alone = limits(under, under.known, replace(none, count=0, noise=np.zeros(0)))[VISCOUS]
+    assert alone.size <= limit_of({VISCOUS: OWN}, HELD).size
+
+
+def test_what_recordings_set_aside_do_not_show_must_show_in_two_others():
+    quarter = np.arange(len(OWN)) < len(OWN) // 4
+    assert limit_of({VISCOUS: OWN}, 0.0 * HELD) is not None
+    assert limit_of({VISCOUS: OWN * quarter}, 0.0 * HELD) is None

@@ -1,0 +1,79 @@
+"""The recording to make next: the one in which two robots part furthest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.concealing import EV3, recorded
+
+from gecar.reality.advise.next_recording import LEAST_DIFFERENCE, LIBRARY, difference, suggest
+from gecar.reality.materiality import Size
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.recordings.recording import Recording
+from gecar.reality.verdict import Found, Limit
+from gecar.world.robot import Robot
+
+
+def seen_on(course: str) -> Recording:
+    run = recorded(EV3, 1)
+    return replace(run, setup=replace(run.setup, course=course), reflection_pct=np.full(len(run.t_s), 100.0))
+
+
+LIKE = seen_on("paper")
+NOISE = estimate_noise([LIKE], EV3.physics, 1.0)
+
+
+def with_effect(effect: str, label: str, value: float) -> Robot:
+    return EV3.with_effects({effect: {label: value}})
+
+
+LATE, LAGGING = (
+    with_effect("sensor_delay", "time_s", 0.04),
+    with_effect("sensor_lag", "time_constant_s", 0.04),
+)
+
+
+def parted(like: Recording, one: Robot = LATE, other: Robot = LAGGING) -> dict[str, float]:
+    return {name: difference(commands, one, other, like, NOISE) for name, commands in LIBRARY.items()}
+
+
+def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
+    suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False)
+    differences = parted(LIKE)
+    best = max(differences, key=lambda name: differences[name])
+    assert differences[best] > 100.0
+    assert suggested.why.startswith(f"{best}: distinguishes sensor_delay from sensor_lag")
+    assert suggested.commands == LIBRARY[best]
+
+
+def test_where_no_sequence_tells_two_robots_apart_that_is_said() -> None:
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
+    suggested = suggest(LATE, found, [LAGGING], seen_on("none"), NOISE, unexplained=False)
+    assert "no sequence of the library distinguishes" in suggested.why
+
+
+@pytest.mark.parametrize(("effect", "value"), [("backlash", 5.0), ("actuation_delay", 0.03)])
+def test_motors_that_differ_are_told_apart_without_a_line(effect: str, value: float) -> None:
+    label = "angle_deg" if effect == "backlash" else "time_s"
+    differences = parted(seen_on("none"), EV3, with_effect(effect, label, value))
+    assert max(differences.values()) > 10.0
+
+
+def test_what_these_recordings_say_nothing_of_is_asked_for() -> None:
+    unseen = {"backlash": None, "sensor_delay": None, "track_width": Limit(0.01, "1")}
+    suggested = suggest(EV3, (), [], LIKE, NOISE, unexplained=False, limits=unseen)
+    name, why = suggested.why.split(": ")
+    assert "backlash" in why
+    assert "track_width" not in why
+    assert parted(LIKE, EV3, with_effect("backlash", "angle_deg", 1.0))[name] >= LEAST_DIFFERENCE
+
+
+def test_the_recording_shows_the_effect_one_asks_about() -> None:
+    found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
+    suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False, about="floor_tilt")
+    assert suggested.why.endswith("would show floor_tilt")
+    blind = suggest(EV3, (), [], seen_on("none"), NOISE, unexplained=False, about="sensor_lag")
+    assert "no sequence of the library shows sensor_lag with these sensors" in blind.why

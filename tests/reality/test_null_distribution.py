@@ -1,0 +1,38 @@
+"""The null distribution holds what the search for an effect finds where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.concealing import EV3, recorded
+
+from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.residuals.of_case import motion_residuals
+from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.null_distribution import largest_gains
+from gecar.reality.selection.problem import Problem, problem_of
+from gecar.reality.selection.screening import candidate_steps
+
+
+def of_noise(effect: str, seed: int) -> Problem:
+    """Return the problem of one effect and recordings in which nothing is missing."""
+    runs = [recorded(EV3, 10 * seed + k, seconds=4.0) for k in range(3)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    return problem_of(residuals, EV3, (effect,))
+
+
+@pytest.mark.parametrize("effect", ["slippery_patch", "torque_ripple", "speed_limit"])
+def test_what_a_search_over_places_cycles_and_limits_finds_in_noise_is_no_surprise(
+    effect: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gecar.reality.selection.screening.PRICE", -1.0)  # fit it whatever it promises
+    monkeypatch.setattr("gecar.reality.selection.screening.NEGLIGIBLE", -1.0)
+    monkeypatch.setattr("gecar.reality.fitting.initial_values.LEAST_GAIN", -1.0)
+    p = []
+    for seed in range(4):
+        problem = of_noise(effect, seed)
+        nulls = largest_gains(problem.estimator, problem.catalogue, problem.known)
+        gain = max(step.gain for step in candidate_steps(problem, problem.known))
+        assert np.quantile(nulls, 0.95) > 0.0
+        p.append(np.mean(nulls >= gain))
+    assert min(p) > 0.05 / 4
