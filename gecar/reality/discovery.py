@@ -51,7 +51,7 @@ from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
-from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE, STANDING_OUT
+from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -384,8 +384,7 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 
 def _is_left(stage: _Stage) -> bool:
     """Whether something is left that a law may explain: it is material, or stands out of all that constants explain."""
-    found = stage.explained.problem.estimator.discrepancy
-    return stage.explained.unexplained or (found is not None and float(found.ratios.max()) > STANDING_OUT)
+    return stage.explained.unexplained or stage.explained.problem.is_beyond_constants
 
 
 def _is_material(stage: _Stage) -> bool:

@@ -44,6 +44,7 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, read_case
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import problem_of
 from gecar.reality.selection.share import Share
@@ -339,7 +340,7 @@ def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkey
     (law,) = verdict.invented
     assert law.term.law == "c1 * sin(k1 * angle)"
     assert law.parameters["c1"].value == pytest.approx(share, rel=0.1)
-    monkeypatch.setattr(discovery, "STANDING_OUT", np.inf)
+    monkeypatch.setattr(selection_problem, "STANDING_OUT", np.inf)
     assert with_oval_wheels(share).invented == ()
 
 

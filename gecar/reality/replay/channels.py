@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 CHANNELS = ("left_angle", "right_angle", "battery", "yaw_rate", "x", "y", "heading", "reflection")
-ENCODERS, POSE, REFLECTION = (0, 1), (4, 5, 6), 7
+ENCODERS, BATTERY, POSE, REFLECTION = (0, 1), 2, (4, 5, 6), 7
 
 
 @dataclass(frozen=True)

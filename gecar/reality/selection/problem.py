@@ -18,9 +18,10 @@ from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.optimisation.least_squares import cost_of_each, least_squares
 from gecar.reality.recordings.recording import Recording
+from gecar.reality.replay.channels import BATTERY
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.parting import Sizes
-from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL, UNNAMED
+from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL, STANDING_OUT, UNNAMED
 from gecar.world.effects import BY_ID, Parameter
 from gecar.world.robot import Robot
 
@@ -296,6 +297,15 @@ class Problem:
             if was - now < CONVERGED:
                 break
         return problem if before - now >= PRICE else None
+
+    @property
+    def is_beyond_constants(self) -> bool:
+        """Whether what a model leaves stands far out of all that large changes of the robot's constants could be.
+
+        That is of how it moves or what it reads: a battery's voltage may have a story of its own.
+        """
+        found = self.estimator.discrepancy
+        return found is not None and float(np.delete(found.ratios, BATTERY).max()) > STANDING_OUT
 
     def _on(self, residuals: Residuals) -> Problem:
         """Return the problem of other residuals, with nothing known of their discrepancy."""
