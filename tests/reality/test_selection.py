@@ -18,6 +18,7 @@ from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_cos
 from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
+from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection import stepwise
 from gecar.reality.selection.acceptance import candidates, stands_out, unevenness, worsens
 from gecar.reality.selection.alternatives import alternatives
@@ -197,6 +198,16 @@ def test_a_strong_cause_is_named_though_its_size_seems_to_differ_by_a_tenth() ->
     assert step.effect == VISCOUS
     assert (step.left_out > 100.0).all()  # its own small change does not hide what recordings have in common
     assert not explained.drifting
+
+
+def test_what_is_hardly_material_is_unexplained_if_it_stands_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    unknown = linear({}, RESPONSES)
+    unknown = replace(unknown, noise=unknown.noise + unlike(RESPONSES[VISCOUS], 9, 0.9))
+    explained = explain(linear_problem(unknown))
+    assert 1.0 < explained.problem.material.times(explained.left) < 1.65
+    assert explained.unexplained
+    monkeypatch.setattr(selection_problem, "STANDING_OUT", np.inf)
+    assert not explain(linear_problem(unknown)).unexplained
 
 
 def test_a_small_effect_that_leaves_more_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

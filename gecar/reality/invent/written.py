@@ -123,7 +123,7 @@ def _explained_with(
         minor=(),
         whole=model,
         left=left,
-        unexplained=is_much(problem.material.times(left), left_before(first.problem), LAWS_LEAVE),
+        unexplained=is_much(problem, problem.material.times(left), left_before(first.problem), LAWS_LEAVE),
     )
 
 

@@ -169,7 +169,7 @@ def concluded(
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
         left = left_by(problem, model)
-    much = is_much(problem.material.times(left), before, left_share(model.effects))
+    much = is_much(problem, problem.material.times(left), before, left_share(model.effects))
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
@@ -183,7 +183,7 @@ def _standing_beside(
     one that gains least, of the others the most uneven, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
-    if not is_much(now, before, left_share(model.effects)):
+    if not is_much(problem, now, before, left_share(model.effects)):
         return list(steps)
     small = [
         step
@@ -232,17 +232,22 @@ def left_before(problem: Problem) -> float:
     return problem.material.times(left)
 
 
-def is_much(now: float, before: float, allowed: float) -> bool:
+def is_much(problem: Problem, now: float, before: float, allowed: float) -> bool:
     """Whether a model leaves more than is material, and than the share of the error that its own laws may leave.
+
+    Measurement errors and several small things may add up to more than is material; what stands out of them may not.
 
     Parameters
     ----------
+    problem
+        Under the discrepancy that the model leaves.
     now, before
         What is left, with the model and with nothing fitted, in times the material size.
     allowed
         That share.
     """
-    return now > SEVERAL and now / max(before, 1.0) > allowed
+    least = 1.0 if problem.is_beyond_constants else SEVERAL
+    return now > least and now / max(before, 1.0) > allowed
 
 
 def left_share(effects: Sequence[str]) -> float:
