@@ -6,54 +6,27 @@ It was written by someone who had not read the tool that is examined, nor what i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks.concealed.effects import Rng, strength
-from benchmarks.concealed.outside import Outside
-from benchmarks.concealed.robot import NEUTRAL, Concealed
-
-Drawn = tuple[list[Concealed], dict[str, Any]]
+from benchmarks.concealed.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
+from benchmarks.concealed.robot import NEUTRAL
 
 _KNOTS = 32  # of a drive that wanders: 16 s, longer than a recording
 _LASTS = 0.6  # share of a knot's deviation that is left at the next
 
 
-def _phase(rng: Rng) -> float:
-    return float(rng.uniform(-math.pi, math.pi))
-
-
-def _side(rng: Rng) -> int:
-    return int(rng.integers(2))
-
-
-def _sign(rng: Rng) -> float:
-    return 1.0 if rng.random() < 0.5 else -1.0
-
-
-def _same(
-    change: Callable[[Rng, float], tuple[dict[str, Any], dict[str, Any]]],
-) -> Callable[[Rng, int, float], Drawn]:
-    """Make a draw of one robot for all recordings from a draw of its fields and of the label's numbers."""
-
-    def draw(rng: Rng, runs: int, least: float) -> Drawn:
-        changes, numbers = change(rng, least)
-        return [replace(NEUTRAL, **changes)] * runs, numbers
-
-    return draw
-
-
-@_same
+@same_in_all
 def _axle_rub(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Up to twice a gearbox's own friction [N m]; with more the robot could not take a wide bend."""
     torque = strength(rng, 0.005, 0.035, least)
     return {"axle_rub": torque}, {"torque_nm": torque}
 
 
-@_same
+@same_in_all
 def _strip(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Lay it where recordings start and line followers pass; torque [N m] for each wheel on it."""
     torque, width = strength(rng, 0.01, 0.06, least), float(rng.uniform(0.15, 0.40))
@@ -62,34 +35,34 @@ def _strip(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     return {"strip": (torque, x, width, angle)}, numbers
 
 
-@_same
+@same_in_all
 def _reversal_pause(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Drivers of model cars wait so, and so do bridges of relays."""
     pause = strength(rng, 0.008, 0.06, least)
     return {"reversal_pause": pause}, {"seconds": pause}
 
 
-@_same
+@same_in_all
 def _toe(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Lean one axle by two and a half to seven degrees: a LEGO axle in a worn hole has as much play."""
-    angle, side = _sign(rng) * math.radians(strength(rng, 2.5, 7.0, least)), _side(rng)
+    angle, side = some_sign(rng) * math.radians(strength(rng, 2.5, 7.0, least)), some_side(rng)
     return {"toe": (angle, side)}, {"angle_rad": angle, "side": side}
 
 
-@_same
+@same_in_all
 def _trailer(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Hang on a weight of 20 to 160 g that rubs with a coefficient of a half [N, m]."""
     force, length = strength(rng, 0.1, 0.8, least), float(rng.uniform(0.08, 0.30))
     return {"trailer": (force, length)}, {"force_n": force, "length_m": length}
 
 
-@_same
+@same_in_all
 def _twist(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     stiffness = strength(rng, 0.002, 0.015, least)
     return {"twist": stiffness}, {"nm_per_rad": stiffness}
 
 
-@_same
+@same_in_all
 def _keeper(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """LEGO's own firmware regulates speed by such a sum, if asked to; rate [1/s], and the most it adds."""
     rate, most = strength(rng, 0.2, 4.0, least), float(rng.uniform(0.08, 0.20))
@@ -98,7 +71,7 @@ def _keeper(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _wander(rng: Rng, runs: int, least: float) -> Drawn:
     """Draw another course of the drive in every recording, with a mean of nothing."""
-    share, side = strength(rng, 0.02, 0.15, least), _side(rng)
+    share, side = strength(rng, 0.02, 0.15, least), some_side(rng)
 
     def knots() -> tuple[float, ...]:
         drawn = rng.normal(size=_KNOTS)
@@ -110,17 +83,17 @@ def _wander(rng: Rng, runs: int, least: float) -> Drawn:
     return [replace(NEUTRAL, wander=(side, knots())) for _ in range(runs)], {"share": share, "side": side}
 
 
-@_same
+@same_in_all
 def _shadow(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     loss, x = strength(rng, 0.10, 0.30, least), float(rng.uniform(0.7, 1.7))
-    blur, way = float(rng.uniform(0.01, 0.05)), _phase(rng)
+    blur, way = float(rng.uniform(0.01, 0.05)), some_phase(rng)
     numbers = {"loss": loss, "x_m": x, "blur_m": blur, "way_rad": way}
     return {"shadow": (loss, x, blur, way)}, numbers
 
 
-@_same
+@same_in_all
 def _marker(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    away, way = strength(rng, 0.012, 0.05, least), _phase(rng)
+    away, way = strength(rng, 0.012, 0.05, least), some_phase(rng)
     ahead, left = away * math.cos(way), away * math.sin(way)
     return {"marker": (ahead, left)}, {"ahead_m": ahead, "left_m": left}
 

@@ -13,7 +13,8 @@ from benchmarks.concealed.effects import Rng, strength
 from benchmarks.concealed.robot import NEUTRAL, Concealed
 
 # One robot per recording: weather and radio differ from run to run, everything else is the same.
-Draw = Callable[[Rng, int, float], tuple[list[Concealed], dict[str, Any]]]
+Drawn = tuple[list[Concealed], dict[str, Any]]
+Draw = Callable[[Rng, int, float], Drawn]
 
 
 @dataclass(frozen=True)
@@ -39,65 +40,84 @@ class Outside:
     last: bool = False
 
 
-def _phase(rng: Rng) -> float:
+def some_phase(rng: Rng) -> float:
+    """Draw an angle [rad]."""
     return float(rng.uniform(-math.pi, math.pi))
 
 
-def _sign(rng: Rng) -> float:
+def some_side(rng: Rng) -> int:
+    """Draw the left wheel (0) or the right one (1)."""
+    return int(rng.integers(2))
+
+
+def some_sign(rng: Rng) -> float:
+    """Draw 1 or -1."""
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
-def _same(runs: int, numbers: dict[str, Any], **changes: Any) -> tuple[list[Concealed], dict[str, Any]]:
+def same_in_all(change: Callable[[Rng, float], tuple[dict[str, Any], dict[str, Any]]]) -> Draw:
+    """Make a draw of one robot for all recordings from a draw of its fields and of the label's numbers."""
+
+    def draw(rng: Rng, runs: int, least: float) -> Drawn:
+        changes, numbers = change(rng, least)
+        return _same(runs, numbers, **changes)
+
+    return draw
+
+
+def _same(runs: int, numbers: dict[str, Any], **changes: Any) -> Drawn:
     return [replace(NEUTRAL, **changes)] * runs, numbers
 
 
-def _off_centre(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _off_centre(rng: Rng, runs: int, least: float) -> Drawn:
     offset = strength(rng, 0.002, 0.006, least)
-    return _same(runs, {"offset_m": offset}, off_centre=(offset, _phase(rng), _phase(rng)))
+    return _same(runs, {"offset_m": offset}, off_centre=(offset, some_phase(rng), some_phase(rng)))
 
 
-def _oval(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _oval(rng: Rng, runs: int, least: float) -> Drawn:
     half = strength(rng, 0.0008, 0.003, least)
-    return _same(runs, {"half_axes_differ_m": 2.0 * half}, oval=(half, _phase(rng), _phase(rng)))
+    return _same(runs, {"half_axes_differ_m": 2.0 * half}, oval=(half, some_phase(rng), some_phase(rng)))
 
 
-def _tether(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _tether(rng: Rng, runs: int, least: float) -> Drawn:
     x, y = float(rng.uniform(0.4, 2.0)), float(rng.uniform(0.2, 1.0))
     stiffness = strength(rng, 0.4, 2.5, least)
     return _same(runs, {"x_m": x, "y_m": y, "n_per_m": stiffness}, tether=(x, y, stiffness))
 
 
-def _magnet(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _magnet(rng: Rng, runs: int, least: float) -> Drawn:
     x, y, core = float(rng.uniform(0.9, 1.5)), float(rng.uniform(0.45, 0.75)), float(rng.uniform(0.10, 0.25))
     pull = strength(rng, 0.4, 2.5, least)
     return _same(runs, {"x_m": x, "y_m": y, "core_m": core, "pull_n": pull}, magnet=(x, y, core, pull))
 
 
-def _waves(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _waves(rng: Rng, runs: int, least: float) -> Drawn:
     slope, length = strength(rng, 0.015, 0.10, least), float(rng.uniform(0.2, 0.5))
     return _same(
-        runs, {"slope_rad": slope, "length_m": length}, waves=(slope, length, _phase(rng), _phase(rng))
+        runs,
+        {"slope_rad": slope, "length_m": length},
+        waves=(slope, length, some_phase(rng), some_phase(rng)),
     )
 
 
-def _gusts(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _gusts(rng: Rng, runs: int, least: float) -> Drawn:
     """Draw eight gusts a run, each from anywhere."""
     force = strength(rng, 0.4, 2.5, least)
 
     def gust() -> tuple[float, float, float, float]:
-        way, length = _phase(rng), float(rng.uniform(0.15, 0.6))
+        way, length = some_phase(rng), float(rng.uniform(0.15, 0.6))
         return float(rng.uniform(0.3, 11.5)), length, force * math.cos(way), force * math.sin(way)
 
     robots = [replace(NEUTRAL, gusts=tuple(gust() for _ in range(8))) for _ in range(runs)]
     return robots, {"force_n": force}
 
 
-def _air_drag(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _air_drag(rng: Rng, runs: int, least: float) -> Drawn:
     drag = strength(rng, 2.0, 20.0, least)
     return _same(runs, {"n_s2_per_m2": drag}, air_drag=drag)
 
 
-def _bump(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _bump(rng: Rng, runs: int, least: float) -> Drawn:
     """Lay a ridge where line followers pass and no recording starts."""
     height, x, angle = (
         strength(rng, 0.0012, 0.004, least),
@@ -107,23 +127,23 @@ def _bump(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str,
     return _same(runs, {"height_m": height, "x_m": x, "angle_rad": angle}, bump=(height, x, angle))
 
 
-def _lens(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _lens(rng: Rng, runs: int, least: float) -> Drawn:
     """Bend the picture: at 1 m from the middle a pose is off by that many metres."""
-    bend = _sign(rng) * strength(rng, 0.03, 0.2, least)
+    bend = some_sign(rng) * strength(rng, 0.03, 0.2, least)
     return _same(runs, {"per_m2": bend}, lens=bend)
 
 
-def _ambient(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
-    loss, source = strength(rng, 0.05, 0.4, least), _phase(rng)
+def _ambient(rng: Rng, runs: int, least: float) -> Drawn:
+    loss, source = strength(rng, 0.05, 0.4, least), some_phase(rng)
     return _same(runs, {"loss": loss, "heading_rad": source}, ambient=(loss, source))
 
 
-def _pose_drift(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
-    rate = _sign(rng) * strength(rng, 0.1, 1.0, least)
+def _pose_drift(rng: Rng, runs: int, least: float) -> Drawn:
+    rate = some_sign(rng) * strength(rng, 0.1, 1.0, least)
     return _same(runs, {"deg_per_s": rate}, pose_drift_deg=rate)
 
 
-def _dropouts(rng: Rng, runs: int, least: float) -> tuple[list[Concealed], dict[str, Any]]:
+def _dropouts(rng: Rng, runs: int, least: float) -> Drawn:
     """Lose the radio link a few times a run."""
     length, count = strength(rng, 0.05, 0.3, least), int(rng.integers(4, 10))
     robots = []

@@ -3,145 +3,118 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from benchmarks.concealed.effects import Rng, strength
-from benchmarks.concealed.outside import Outside
-from benchmarks.concealed.robot import NEUTRAL, Concealed
-
-Drawn = tuple[list[Concealed], dict[str, Any]]
+from benchmarks.concealed.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
+from benchmarks.concealed.robot import NEUTRAL
 
 
-def _phase(rng: Rng) -> float:
-    return float(rng.uniform(-math.pi, math.pi))
-
-
-def _side(rng: Rng) -> int:
-    return int(rng.integers(2))
-
-
-def _sign(rng: Rng) -> float:
-    return 1.0 if rng.random() < 0.5 else -1.0
-
-
-def _same(
-    change: Callable[[Rng, float], tuple[dict[str, Any], dict[str, Any]]],
-) -> Callable[[Rng, int, float], Drawn]:
-    """Make a draw of one robot for all recordings from a draw of its fields and of the label's numbers."""
-
-    def draw(rng: Rng, runs: int, least: float) -> Drawn:
-        changes, numbers = change(rng, least)
-        return [replace(NEUTRAL, **changes)] * runs, numbers
-
-    return draw
-
-
-@_same
+@same_in_all
 def _heat(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Copper gains 0.39 % of resistance a kelvin: 5 to 80 K."""
-    share, time_s, side = strength(rng, 0.02, 0.30, least), float(rng.uniform(2.0, 8.0)), _side(rng)
+    share, time_s, side = strength(rng, 0.02, 0.30, least), float(rng.uniform(2.0, 8.0)), some_side(rng)
     return {"heat": (share, time_s, side)}, {"resistance_share": share, "time_s": time_s, "side": side}
 
 
-@_same
+@same_in_all
 def _loosening(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    rate, side = strength(rng, 0.15, 3.0, least), _side(rng)
+    rate, side = strength(rng, 0.15, 3.0, least), some_side(rng)
     return {"loosening": (math.radians(rate), side)}, {"deg_per_s": rate, "side": side}
 
 
-@_same
+@same_in_all
 def _duty_steps(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     step = strength(rng, 3.0, 15.0, least)
     return {"duty_step_pct": step}, {"step_pct": step}
 
 
-@_same
+@same_in_all
 def _shared_drop(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     share = strength(rng, 0.01, 0.15, least)
     return {"shared_drop": share}, {"share": share}
 
 
-@_same
+@same_in_all
 def _current_limit(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     limit = 1.0 / strength(rng, 1.0 / 1.2, 1.0 / 0.25, least)
     return {"current_limit": limit}, {"limit_a": limit}
 
 
-@_same
+@same_in_all
 def _dust(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Grip left: 40 % of 0.9 down to 6 %."""
     left, way = 1.0 / strength(rng, 1.0 / 0.4, 1.0 / 0.06, least), float(rng.uniform(0.5, 1.5))
     return {"dust": (max(1.0 - left, 0.01), way)}, {"grip_left": left, "way_m": way}
 
 
-@_same
+@same_in_all
 def _pile(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    force, way = strength(rng, 0.1, 1.0, least), _phase(rng)
+    force, way = strength(rng, 0.1, 1.0, least), some_phase(rng)
     return {"pile": (force, way)}, {"force_n": force, "heading_rad": way}
 
 
-@_same
+@same_in_all
 def _yaw_pull(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    torque = _sign(rng) * strength(rng, 0.002, 0.03, least)
+    torque = some_sign(rng) * strength(rng, 0.002, 0.03, least)
     return {"yaw_pull": torque}, {"torque_nm": torque}
 
 
 def _camera_bump(rng: Rng, runs: int, least: float) -> Drawn:
     """Draw a bump of the same kind in every recording, at its own time."""
-    size, turn = strength(rng, 0.003, 0.03, least), _sign(rng) * strength(rng, 0.003, 0.02, least)
+    size, turn = strength(rng, 0.003, 0.03, least), some_sign(rng) * strength(rng, 0.003, 0.02, least)
     robots = []
     for _ in range(runs):
-        way = _phase(rng)
+        way = some_phase(rng)
         bump = (float(rng.uniform(2.0, 10.0)), size * math.cos(way), size * math.sin(way), turn)
         robots.append(replace(NEUTRAL, camera_bump=bump))
     return robots, {"shift_m": size, "turn_rad": turn}
 
 
-@_same
+@same_in_all
 def _flicker(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     share, hertz = strength(rng, 0.02, 0.3, least), float(rng.uniform(0.6, 1.6))
-    return {"flicker": (share, hertz, _phase(rng))}, {"share": share, "hz": hertz}
+    return {"flicker": (share, hertz, some_phase(rng))}, {"share": share, "hz": hertz}
 
 
-@_same
+@same_in_all
 def _tooth(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     torque, width = strength(rng, 0.03, 0.3, least), float(rng.uniform(0.15, 0.5))
-    side = _side(rng)
-    changes = {"tooth": (torque, width, side, _phase(rng) + math.pi)}
+    side = some_side(rng)
+    changes = {"tooth": (torque, width, side, some_phase(rng) + math.pi)}
     return changes, {"torque_nm": torque, "width_rad": width, "side": side}
 
 
-@_same
+@same_in_all
 def _sway(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Softer mounts swing further: 12 mm per m/s^2 at 1.5 Hz, 0.4 mm at 8 Hz."""
     hertz = 1.0 / strength(rng, 1.0 / 8.0, 1.0 / 1.5, least)
     return {"sway": (hertz, float(rng.uniform(0.1, 0.4)))}, {"hz": hertz}
 
 
-@_same
+@same_in_all
 def _hop(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     left, fast = 1.0 / strength(rng, 1.0 / 0.5, 1.0 / 0.02, least), float(rng.uniform(3.0, 6.0))
-    side = _side(rng)
+    side = some_side(rng)
     return {"hop": (max(1.0 - left, 0.01), fast, side)}, {"grip_left": left, "from_rad_s": fast, "side": side}
 
 
-@_same
+@same_in_all
 def _coasting(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     share = min(strength(rng, 0.1, 1.0, least), 1.0)
     return {"coasting": share}, {"share": share}
 
 
-@_same
+@same_in_all
 def _swivel(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     force, trail = strength(rng, 0.05, 0.8, least), float(rng.uniform(0.008, 0.02))
     return {"swivel": (force, trail)}, {"force_n": force, "trail_m": trail}
 
 
-@_same
+@same_in_all
 def _rubber_band(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    stiffness, side = strength(rng, 0.0003, 0.006, least), _side(rng)
+    stiffness, side = strength(rng, 0.0003, 0.006, least), some_side(rng)
     return {"rubber_band": (stiffness, side)}, {"nm_per_rad": stiffness, "side": side}
 
 

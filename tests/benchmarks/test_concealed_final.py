@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 import math
 
@@ -13,6 +12,8 @@ import pytest
 pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the last kinds are not tested (pip install gecar[test])"
 )
+
+from support.concealed_worlds import HERE
 
 from benchmarks.concealed import cases
 from benchmarks.concealed.__main__ import main
@@ -28,16 +29,6 @@ from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.worlds import WORLDS, holds, truth
 
-HERE = [
-    pytest.param(
-        world,
-        marks=pytest.mark.skipif(
-            world == "bullet" and importlib.util.find_spec("pybullet") is None,
-            reason="PYBULLET IS MISSING: its world is not tested (pip install gecar[bench])",
-        ),
-    )
-    for world in WORLDS
-]
 LEFT, RIGHT = 0, 1
 LESS, MORE = -1, 1
 AHEAD, ASIDE, TURNED = 0, 1, 2  # of the pose

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 
@@ -10,6 +9,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="MUJOCO IS MISSING: worlds are not compared (pip install gecar[test])")
+
+from support.concealed_worlds import HERE
 
 from benchmarks.concealed import cases, commands
 from benchmarks.concealed.__main__ import main
@@ -24,19 +25,9 @@ from benchmarks.concealed.robot import LARGE, NEUTRAL, Concealed
 from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.sizes import is_material, size
-from benchmarks.concealed.worlds import WORLDS, truth
+from benchmarks.concealed.worlds import truth
 from gecar.world.robot import read_robot
 
-HERE = [
-    pytest.param(
-        world,
-        marks=pytest.mark.skipif(
-            world == "bullet" and importlib.util.find_spec("pybullet") is None,
-            reason="PYBULLET IS MISSING: its world is not tested (pip install gecar[bench])",
-        ),
-    )
-    for world in WORLDS
-]
 ANY, LESS, MORE = 0, -1, 1  # how the way, or the turn, differs from the nominal robot's
 LEFT = 0
 

@@ -101,9 +101,8 @@ class _Robot:
         self._lean(0.0, 0.0)
         self._body = build(self._client, concealed)
         self._settle(start)
-        self._train, self._memory = np.zeros(drive.SIZE), np.zeros(chassis.SIZE)
+        self._train, self._memory = np.zeros(drive.SIZE), chassis.start(numbers(concealed), *start)
         self._train[drive.TERMINAL] = concealed.base.supply * concealed.supply_scale
-        self._memory[:] = chassis.start(numbers(concealed), *start)
         self._grips = [concealed.tyre_friction] * 2
         self._look()
         self._origin = self._angles
