@@ -1,7 +1,5 @@
 """Import: what people have on disk, in their units and under their names, becomes a recording."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from support.foreign_logs import (
@@ -9,11 +7,9 @@ from support.foreign_logs import (
     assert_same,
     brick_log,
     camera_log,
-    import_texts,
     pose_errors,
     table,
 )
-from support.synthetic import drive
 
 from gecar.errors import InputError
 from gecar.reality.recordings.columns import COLUMNS
@@ -22,16 +18,6 @@ from gecar.reality.recordings.importing.frame import Frame
 from gecar.reality.recordings.importing.meaning import guess_meanings, parse_said
 from gecar.reality.recordings.recording import read_recording, write_recording
 from gecar.reality.recordings.setup import Setup
-
-
-@pytest.fixture(scope="module")
-def run():
-    return drive(3)
-
-
-@pytest.fixture
-def bring_in(tmp_path):
-    return partial(import_texts, tmp_path)
 
 
 def test_recording_format_itself_comes_through(bring_in, run):

@@ -1,6 +1,5 @@
 """Import of two logs on two clocks: the offset is found from motion, or refused."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ from support.foreign_logs import (
     assert_same,
     brick_log,
     camera_log,
-    import_texts,
     pose_errors,
     table,
 )
@@ -25,16 +23,6 @@ from gecar.reality.recordings.importing.track import Track
 from gecar.reality.recordings.recording import read_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
-
-
-@pytest.fixture(scope="module")
-def run():
-    return drive(3)
-
-
-@pytest.fixture
-def bring_in(tmp_path):
-    return partial(import_texts, tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(4))

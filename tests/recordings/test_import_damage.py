@@ -1,7 +1,5 @@
 """Import of damaged logs: mended, and said, where that is safe; refused with a reason elsewhere."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,27 +10,15 @@ from support.foreign_logs import (
     brick_log,
     camera_log,
     import_all,
-    import_texts,
     pose_errors,
     with_line,
 )
-from support.synthetic import drive
 
 from gecar.errors import InputError
 from gecar.reality.recordings.importing.logs import ImportOptions, import_logs
 from gecar.reality.recordings.recording import read_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.world.robot import load_robot
-
-
-@pytest.fixture(scope="module")
-def run():
-    return drive(3)
-
-
-@pytest.fixture
-def bring_in(tmp_path):
-    return partial(import_texts, tmp_path)
 
 
 def test_cut_last_line_is_left_out(bring_in, run):

@@ -1,7 +1,5 @@
 """Import of logs in the forms of public data sets: Arduino serial, Neato, EMPS and QUARC, ROS, EV3 Python, Excel."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -26,16 +24,6 @@ from gecar.world.robot import load_robot
 
 WHEELS = ("t_s", "left_duty_pct", "right_duty_pct", "left_angle_deg", "right_angle_deg")
 BENCH = Setup(rig="bench", course="none")
-
-
-@pytest.fixture(scope="module")
-def run():
-    return drive(3)
-
-
-@pytest.fixture
-def bring_in(tmp_path):
-    return partial(import_texts, tmp_path)
 
 
 def column(recording, name, scale=1.0):
