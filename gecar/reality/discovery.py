@@ -383,12 +383,12 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 
 
 def _is_left(stage: _Stage) -> bool:
-    """Whether something is left that a law may explain: it is material, or stands out of all that constants explain."""
+    """Whether a law is worth looking for: what is left is material, or no change of constants could explain it."""
     return stage.explained.unexplained or stage.explained.problem.is_beyond_constants
 
 
 def _is_material(stage: _Stage) -> bool:
-    """Whether a stage's laws do something material to the robot."""
+    """Whether one of a stage's laws moves the robot, or changes a reading, by a material amount."""
     material = stage.explained.problem.material
     return any(material.times(law.size) >= 1.0 for law in stage.invented)
 

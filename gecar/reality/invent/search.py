@@ -295,7 +295,7 @@ def _promising(library: Library, singles: Sequence[Laws]) -> set[str]:
 
 
 def _other_forms(library: Library, law: Law, singles: Sequence[Laws]) -> list[Laws]:
-    """Return laws of other forms at the point where a law's fit ended; none for a law without a point.
+    """Return laws of other forms about the point that was fitted for a law; none for a law without a point.
 
     They were tried on a coarse grid of points, where another form may seem to be the best.
     """

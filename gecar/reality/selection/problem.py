@@ -282,7 +282,7 @@ class Problem:
         return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
 
     def with_clocks_beside(self, model: Model) -> Problem | None:
-        """Return the problem with its camera clocks fitted anew beside a model's effects; None where that gains little.
+        """Fit the camera's clocks anew beside a model's effects; None where that gains less than a name costs.
 
         Fitted before an effect was known, clocks have taken up a part of it.
         """
@@ -300,7 +300,7 @@ class Problem:
 
     @property
     def is_beyond_constants(self) -> bool:
-        """Whether what a model leaves stands far out of all that large changes of the robot's constants could be.
+        """Whether a model leaves far more than sensor noise, even with large changes of all the robot's constants.
 
         That is of how it moves or what it reads: a battery's voltage may have a story of its own.
         """
@@ -308,7 +308,7 @@ class Problem:
         return found is not None and float(np.delete(found.ratios, BATTERY).max()) > STANDING_OUT
 
     def _on(self, residuals: Residuals) -> Problem:
-        """Return the problem of other residuals, with nothing known of their discrepancy."""
+        """Return the same problem for other residuals; their discrepancy is not known yet."""
         return self._anew(Estimator(residuals, self.estimator.robot, self.estimator.rng))
 
 

@@ -190,9 +190,11 @@ def _standing_beside(
         for step in steps
         if not (problem.on_bench or is_worthwhile(model, step.effect) or stands_out(problem, step))
     ]
-    hardly = now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5
-    uneven = most_uneven(problem, steps) if hardly else None
-    worst = min(small, key=lambda step: step.gain, default=uneven)
+    worst: Step | None = None
+    if small:
+        worst = min(small, key=lambda step: step.gain)
+    elif now / max(before, 1.0) > (1.0 - WHOLE_SHARE) ** 0.5:
+        worst = most_uneven(problem, steps)
     return [step for step in steps if step is not worst]
 
 
