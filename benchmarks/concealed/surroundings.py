@@ -71,8 +71,10 @@ class Surroundings:
             self._grip(x, y, state)
         if self._hidden.waves is not None:
             slope, length, phase_x, phase_y = self._hidden.waves
-            turn = 2.0 * math.pi / length
-            self._lean(slope * math.sin(turn * x + phase_x), slope * math.sin(turn * y + phase_y))
+            (tilt_x, tilt_y), turn = self._hidden.tilt, 2.0 * math.pi / length
+            self._lean(
+                tilt_x + slope * math.sin(turn * x + phase_x), tilt_y + slope * math.sin(turn * y + phase_y)
+            )
         if self._pushed:
             heading = _heading(state)
             force_x, force_y = self._push(x, y, state.qvel, time_s)

@@ -55,6 +55,7 @@ WAY = [
     ({"caster_friction": 0.8}, LESS),
     ({"rolling_resistance": 0.1}, LESS),
     ({"tilt": (0.05, 0.0)}, MORE),
+    ({"tilt": (-0.05, 0.0), "waves": (0.001, 0.3, 0.0, 0.0)}, LESS),
     ({"clock_skew": 0.05}, LESS),
     ({"off_centre": (0.004, 0.0, 0.0)}, ANY),
     ({"oval": (0.002, 0.0, 0.0)}, ANY),
