@@ -419,7 +419,7 @@ def _left(stage: _Stage) -> float:
 
 def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
     """Return the recordings set aside with the nuisances of those fitted on, fitted anew under a robot's physics."""
-    return _along_paths(motion.problem.with_its_clocks(held, physics), motion, physics)
+    return _along_paths(motion.problem.with_its_camera(held, physics), motion, physics)
 
 
 def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:

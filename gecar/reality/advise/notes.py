@@ -88,6 +88,7 @@ def notes_on(
     if clocks_fitted:
         late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
         notes.append(f"The camera's clock was late by {late} ms in the recordings. This was corrected.")
+    notes += _mark(fitted)
     if doubted:
         notes.append(
             "Readings are right on uniform floor and wrong near lines, and no effect of sensor or line explains it: "
@@ -108,6 +109,21 @@ def _why_refused(candidate: Step) -> str:
     if candidate.drifts:
         return DRIFTS
     return NOT_CONFIRMED + OR_PATH * (BY_ID[candidate.effect].channels == ("sensor",))
+
+
+def _mark(fitted: Residuals) -> list[str]:
+    """Return a note where the camera's mark was found to lie off the axle's centre."""
+    ahead, left, turned = fitted.mark
+    if not (ahead or left or turned):
+        return []
+    along, across = "ahead of" if ahead > 0.0 else "behind", "left" if left > 0.0 else "right"
+    turn = "counter-clockwise" if turned > 0.0 else "clockwise"
+    place = (
+        f"{1e3 * abs(ahead):.1f} mm {along} the axle's centre and {1e3 * abs(left):.1f} mm to its {across}"
+    )
+    return [
+        f"The camera's mark lies {place}, turned by {math.degrees(abs(turned)):.1f} degrees {turn}. This was corrected."
+    ]
 
 
 def _start(run: RecordingResiduals) -> str:

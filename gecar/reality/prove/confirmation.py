@@ -62,8 +62,9 @@ def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
     if not refused or problem.on_bench:
         return first
     problem.tell(f"once more without {', '.join(sorted(refused))}")
-    # Clocks that were fitted on the way are those of the recordings, whatever moves the robot.
-    begun = first.explained.problem if first.explained.problem.clocks_fitted else problem
+    # Clocks and mark that were fitted on the way are the camera's, whatever moves the robot.
+    found = first.explained.problem
+    begun = found if found.clocks_fitted or found.mark_fitted else problem
     again = confirmed(explain(replace(begun, refused=refused), once_more=True), held)
     if len(again.explained.steps) <= len(first.explained.steps):
         return first
@@ -267,4 +268,4 @@ def _without(problem: Problem, model: Model, step: Step) -> Model:
 def _held_errors(explained: Explanation, held: Residuals, model: Model, beside: Model) -> Array:
     """Return a model's residuals of recordings set aside, with small changes as a model asks for."""
     physics = explained.problem.with_small_changes(model, beside)
-    return explained.problem.with_its_clocks(held, physics).errors(physics)
+    return explained.problem.with_its_camera(held, physics).errors(physics)

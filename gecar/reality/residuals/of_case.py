@@ -134,6 +134,11 @@ class Residuals:
         """How late each recording's camera clock is taken to be [s], shape (recordings,)."""
         return np.array([r.nuisances.clock_offset_s for r in self.recordings])
 
+    @property
+    def mark(self) -> tuple[float, float, float]:
+        """Where the camera's mark is taken to be on the robot: ahead, left [m], turned [rad]."""
+        return self.recordings[0].nuisances.mark if self.recordings else (0.0, 0.0, 0.0)
+
     def part(self, numbers: Sequence[int] | npt.NDArray[np.int64]) -> Residuals:
         """Return the residuals of some of the recordings, by their numbers."""
         return replace(self, recordings=tuple(self.recordings[k] for k in numbers))

@@ -78,6 +78,15 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     )
 
 
+def is_elsewhere(problem: Problem, with_mark: Problem, model: Model) -> bool:
+    """Whether what was fitted as the camera's mark differs between recordings, times or regimes: a mark stays."""
+    whitened, physics = problem.estimator.whitened, model.physics
+    without, with_it = (whitened(each.residuals.errors(physics)) for each in (problem, with_mark))
+    splits = list(_splits(problem, model))
+    chance = SIGNIFICANCE / len(splits)
+    return any(_differs(heterogeneity(groups, without, with_it), DRIFTING, chance) for groups in splits)
+
+
 def _differs(found: Heterogeneity, least: float, chance: float) -> bool:
     return found.relative > least and found.p < chance
 

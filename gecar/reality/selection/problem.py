@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting.camera_mark import with_fitted_mark
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.discrepancy import Discrepancy, Method, discrepancy
 from gecar.reality.fitting.estimator import Estimator
@@ -54,8 +55,8 @@ class Problem:
         The robot with nothing fitted.
     tell
         Called with a line of progress.
-    clocks_fitted
-        Whether each camera's clock offset was fitted.
+    clocks_fitted, mark_fitted
+        Whether each camera's clock offset was fitted, and the place of its mark on the robot.
     refused
         Effects of the catalogue that are not tried, as recordings set aside do not confirm them.
     worth
@@ -73,6 +74,7 @@ class Problem:
     known: Model
     tell: Callable[[str], None]
     clocks_fitted: bool = False
+    mark_fitted: bool = False
     refused: frozenset[str] = frozenset()
     worth: Mapping[str, float] = field(default_factory=dict)
     place: Hashable = ()
@@ -260,9 +262,12 @@ class Problem:
         room = np.array([self.share(parameters.coordinates[k].parameter) for k in at])
         return np.clip(lowest, -room, -LEAST_ROOM), np.clip(highest, LEAST_ROOM, room)
 
-    def with_its_clocks(self, held: Residuals, physics: Physics) -> Residuals:
-        """Return recordings set aside, their camera clocks fitted under a robot's physics if this problem's were."""
-        return with_fitted_clocks(held, physics)[0] if self.clocks_fitted and not held.sensor else held
+    def with_its_camera(self, held: Residuals, physics: Physics) -> Residuals:
+        """Return recordings set aside with this problem's mark, and clocks fitted to them if this problem's were."""
+        if held.sensor:
+            return held
+        held = held.with_mark(self.residuals.mark) if self.mark_fitted else held
+        return with_fitted_clocks(held, physics)[0] if self.clocks_fitted else held
 
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
         """Return the problem with camera clocks fitted under a model; None where that gains less than ``least_gain``.
@@ -297,6 +302,23 @@ class Problem:
             if was - now < CONVERGED:
                 break
         return problem if before - now >= PRICE else None
+
+    def with_mark(self, model: Model, least_gain: float = 0.0) -> Problem | None:
+        """Return the problem with the camera's mark fitted under a model; None where too little is gained by it.
+
+        Recordings left out must gain what a name costs and ``least_gain``: a mark has the same place in all of them.
+        """
+        headings = any("heading_rad" in run.measured for run in self.recordings)
+        if self.residuals.sensor or self.on_bench or not headings:
+            return None
+        fitted, gain = with_fitted_mark(self.estimator, model.physics)
+        if gain < max(least_gain, PRICE):
+            return None
+        ahead, left, _ = fitted.mark
+        self.tell(
+            f"the camera's mark: {1e3 * ahead:.1f} mm ahead of the axle's centre, {1e3 * left:.1f} mm left"
+        )
+        return replace(self._on(fitted), mark_fitted=True)
 
     @property
     def is_beyond_constants(self) -> bool:

@@ -25,7 +25,7 @@ from gecar.reality.selection.acceptance import (
     stopped,
 )
 from gecar.reality.selection.cross_validation import judged
-from gecar.reality.selection.homogeneity import drifts
+from gecar.reality.selection.homogeneity import drifts, is_elsewhere
 from gecar.reality.selection.motor_constants import CONSTANTS, with_constants
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
@@ -90,23 +90,23 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
 
     Where it takes several, other beginnings are tried, too: the first effect may have stood in for two causes. That is
     half the time, and not done ``once_more`` where recordings are explained without what was refused or an instrument,
-    or with the camera's clocks fitted anew, as before the effects were known these took up a part of them.
+    or with the camera's clocks and mark fitted anew, as before the effects were known these took up a part of them.
     """
     known = problem.under(problem.known)
     first = candidate_steps(known, known.known)
     if problem.on_bench:
         return _explain_motor(known, first)
-    with_clocks = _with_clocks(known, known.known, first)
-    if with_clocks is not None:
-        return explain(with_clocks, once_more)
+    with_camera = _with_camera(known, known.known, first)
+    if with_camera is not None:
+        return explain(with_camera, once_more)
     chain = _forward(known, _Chain((), known.known, ()), first)
-    if chain.with_clocks is not None:
-        return explain(chain.with_clocks, once_more)
+    if chain.with_camera is not None:
+        return explain(chain.with_camera, once_more)
     others = [] if once_more else _other_beginnings(known, first, chain)
     best = _best_chain(problem, [chain, *others])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
-    renewed = None if once_more else problem.under(model).with_clocks_beside(model)
+    renewed = None if once_more else _with_camera_beside(problem.under(model), model)
     if renewed is not None:
         return explain(renewed, once_more=True)
     return concluded(problem, model, steps, tried)
@@ -262,14 +262,14 @@ def left_share(effects: Sequence[str]) -> float:
 class _Chain:
     """One forward selection.
 
-    Of the steps taken ``model`` holds the effects; ``with_clocks`` is the problem to begin anew, where the camera's
-    clocks had to be fitted on the way.
+    Of the steps taken ``model`` holds the effects; ``with_camera`` is the problem to begin anew, where the camera's
+    clocks or mark had to be fitted on the way.
     """
 
     steps: tuple[Step, ...]
     model: Model
     tried: tuple[tuple[Step, ...], ...]
-    with_clocks: Problem | None = None
+    with_camera: Problem | None = None
 
 
 def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Chain | None = None) -> _Chain:
@@ -295,9 +295,9 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Cha
         here = problem.under(step.model)
         model = _refitted(here, step.model)
         stage = tuple(candidate_steps(here, model))
-        with_clocks = _with_clocks(here, model, stage)
-        if with_clocks is not None:
-            return _Chain((), problem.known, (), with_clocks)
+        with_camera = _with_camera(here, model, stage)
+        if with_camera is not None:
+            return _Chain((), problem.known, (), with_camera)
     return _Chain(tuple(steps), model, tuple(tried))
 
 
@@ -334,7 +334,7 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
         return []
     rivals = [s for s in first[1:BEGINNINGS] if s.gain > COMPETING * first[0].gain and not stopped(s)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in rivals]
-    return [other for other in chains if other is not chain and other.with_clocks is None]
+    return [other for other in chains if other is not chain and other.with_camera is None]
 
 
 def _effects(steps: Sequence[Step]) -> set[str]:
@@ -415,8 +415,24 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
     return None
 
 
-def _with_clocks(problem: Problem, model: Model, stage: Sequence[Step]) -> Problem | None:
-    """Return the problem with camera clocks fitted, where they gain as much as the best effect of a stage."""
+def _with_camera(problem: Problem, model: Model, stage: Sequence[Step]) -> Problem | None:
+    """Return the problem with camera clocks or mark fitted, where they gain as much as the best effect of a stage."""
+    best = stage[0].gain if stage else 0.0
     common = max((step.gain for step in stage if step.effect == COMMON_DELAY), default=0.0)
-    least = max(CLOCKS_FIRST * stage[0].gain, CLOCKS_OVER_COMMON * common) if stage else 0.0
-    return problem.with_clocks(model, least)
+    with_clocks = problem.with_clocks(model, max(CLOCKS_FIRST * best, CLOCKS_OVER_COMMON * common))
+    if with_clocks is not None or problem.mark_fitted:
+        return with_clocks
+    return _with_mark(problem, model, best)
+
+
+def _with_camera_beside(problem: Problem, model: Model) -> Problem | None:
+    """Return the problem with camera clocks and mark fitted anew beside a model's effects; None if it gains little."""
+    with_clocks = problem.with_clocks_beside(model)
+    here = with_clocks.under(model) if with_clocks else problem
+    return _with_mark(here, model) or with_clocks
+
+
+def _with_mark(problem: Problem, model: Model, least_gain: float = 0.0) -> Problem | None:
+    """Return the problem with the camera's mark fitted; None where that gains too little, or is no mark."""
+    found = problem.with_mark(model, least_gain)
+    return None if found is None or is_elsewhere(problem, found, model) else found
