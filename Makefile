@@ -6,6 +6,8 @@ PY := $(VENV)/bin/python
 # Python compiles a module when it is first imported: to compile all that libraries bring takes as long as to install them.
 INSTALL := $(PY) -m pip --disable-pip-version-check install --quiet --no-compile --editable
 ARGS ?=
+# Without compiled modules kept, which some machines ask for, every process compiles all libraries anew: 5 s each.
+export PYTHONDONTWRITEBYTECODE :=
 
 # The first Python here that is new enough; set it yourself with: make env PYTHON=/path/to/python3.12
 NEW_ENOUGH := import sys; print("yes" if sys.version_info >= (3, 11) else "")
