@@ -25,6 +25,7 @@ SHORTEST_S = 0.01  # of a store's time constant: five steps, so that the law doe
 PROBE = 0.1  # step of finite differences, in coordinates
 _STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
 _TURN = re.compile(r"\b(?:sin|cos)\(\w+ \* angle\)")
+_SUM = re.compile(r"store \+ \w+")
 _USUAL = {variable.id: variable.scale for variable in VARIABLES}
 
 
@@ -128,7 +129,8 @@ def _constants(k: int, term: Term) -> list[Constant]:
     """Return the constants of a term that a fit may change.
 
     It may not change where a step stands, because residuals have no derivative by it, nor how often something repeats
-    in a turn of the wheel, because that is a whole number.
+    in a turn of the wheel, because that is a whole number; nor how fast a store adds something up, because the law's
+    own constant says as much.
     """
     free, of_law = [], linear(term)
     for number, name in enumerate(term.free):
@@ -143,6 +145,6 @@ def _constants(k: int, term: Term) -> list[Constant]:
     for name, slot in zip(POINT, (AT_X, AT_Y), strict=True):
         if name in term.constants:
             free.append(Constant(k, name, slot, term.constants[name], POINT_STEP_M, False))
-    if term.store:
+    if term.store and not _SUM.fullmatch(term.store):
         free.append(Constant(k, "store_s", STORE_S, term.store_s, INNER_STEP, True))
     return free

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -34,6 +35,8 @@ _KNOWN = (
            "a push growing with the square of the wheel's speed"),
     _Known(_TORQUE, r"angle", "a spring that winds up as the wheel turns", "a push growing as the wheel turns"),
     _Known(_TORQUE, r"speed", "friction growing with speed", "a push growing with speed"),
+    _Known(_TORQUE, r"(sign|tanh)\(\(?speed - other_speed.*", "axles that rub on each other",
+           "axles that drive each other apart"),
     _Known(_TORQUE, r"sign\(speed\)", "dry friction in the gears", "less dry friction than the robot's file says"),
     _Known(_TORQUE, r"command", "weaker motors", "stronger motors"),
     _Known(_TORQUE, r"current", "motors that give less torque a current", "motors that give more torque a current"),
@@ -94,7 +97,7 @@ _KNOWN = (
 
 def looks_like(term: Term) -> str:
     """Return what a law looks like: its name where it is a known one, or else what it adds and on what that depends."""
-    for say in (_spring, _lens, _once_per_turn, _late, _ramped, _stored, _named):
+    for say in (_spring, _lens, _once_per_turn, _late, _ramped, _paused, _wound_up, _stored, _named):
         words = say(term)
         if words:
             return words + _where(term)
@@ -189,6 +192,27 @@ def _ramped(term: Term) -> str:
     if not most:
         return ""
     return f"commands that ramp, at {100.0 * term.constants[most[1]] / term.store_s:.0f} % a second"
+
+
+def _paused(term: Term) -> str:
+    """Name a pause before a motor turns round: a part of the command is lost while a store still has the old sense."""
+    found = _single(term)
+    if found is None or (found[0], term.store) != ("command * positive(-store * command)", "sign(command)"):
+        return ""
+    pause_s = -found[1] * math.log(2.0) * term.store_s  # 1 - 2 exp(-t / store_s) changes its sign
+    return f"a pause of about {1e3 * pause_s:.0f} ms before a motor turns round" if pause_s > 0.0 else ""
+
+
+def _wound_up(term: Term) -> str:
+    """Name what grows with the angle turned since the start, which a store adds up."""
+    if term.port != "yaw_moment" or term.store != "store + turn_rate":
+        return ""
+    back = _single(term) is not None and term.constants[linear(term)[0]] < 0.0
+    return (
+        "a cable that winds up as the robot turns, and turns it back"
+        if back
+        else "a push that grows with turning"
+    )
 
 
 def _stored(term: Term) -> str:
