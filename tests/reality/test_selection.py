@@ -279,6 +279,23 @@ def test_an_effect_swapped_in_is_judged_itself(monkeypatch: pytest.MonkeyPatch) 
     assert found.gain == pytest.approx(found.base.cost - found.model.cost)
 
 
+@pytest.mark.parametrize(("share", "kept"), [(0.8, True), (0.4, False)])
+def test_to_be_kept_an_effect_may_gain_less_than_to_be_taken(
+    monkeypatch: pytest.MonkeyPatch, share: float, kept: bool
+) -> None:
+    """Beside a wheel's radius, taken after it, a centre of mass gained 9.9, where a name costs 10."""
+    problem = linear_problem(linear({VISCOUS: 4.0, TRACK: 4.0}, RESPONSES))
+    both = problem.estimator.fit((VISCOUS, TRACK), {})
+    steps = stepwise._steps(problem, both)
+    assert all(step.gain > stepwise.PRICE for step in steps)
+    monkeypatch.setattr(stepwise, "_judged", lambda p, m, rest, effect: replace(
+        next(step for step in steps if step.effect == effect), gain=share * stepwise.PRICE
+    ))  # fmt: skip
+    monkeypatch.setattr(stepwise, "_swapped", lambda *_: None)
+    chain = stepwise._Chain(steps, both, (steps,))
+    assert bool(stepwise._swapped_and_dropped(problem, chain, (steps,))[1]) == kept
+
+
 def test_an_effect_that_gains_nothing_on_recordings_set_aside_is_a_candidate() -> None:
     explained = explain(linear_problem(linear({VISCOUS: 3.0, TRACK: 4.0}, RESPONSES)))
     opposite = linear({VISCOUS: -3.0, TRACK: 4.0}, RESPONSES, seed=5)

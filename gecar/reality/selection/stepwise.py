@@ -37,6 +37,7 @@ from gecar.reality.selection.thresholds import (
     MOST_EFFECTS,
     MOST_ON_BENCH,
     PRICE,
+    PROMISING,
     SEVERAL,
     WHOLE_SHARE,
 )
@@ -358,7 +359,8 @@ def _swapped_and_dropped(
     """Judge every effect of a chain beside all others, and those that are settled, under what they leave together.
 
     An effect taken early may have stood in for a cause that only the later ones let come forward: each is swapped
-    against its runners-up, and dropped where the others can do without it.
+    against its runners-up, and dropped where the others can do without it. To be kept it may gain less than to be
+    taken, for what is taken after it takes up a part of what it does.
     """
     steps, model = dict(enumerate(chain.steps)), chain.model
     rivals = {step.effect: step for stage in tried for step in stage[:RIVALS]}
@@ -374,7 +376,7 @@ def _swapped_and_dropped(
         swap = _swapped(here, found, rest, list(rivals.values())) if rest else None
         if swap is not None:
             steps[number], model = replace(swap, stage=step.stage), swap.model
-        elif found.gain < PRICE or not proved(found):
+        elif found.gain < PROMISING * PRICE or not proved(found):
             del steps[number]
             model = found.base
         else:

@@ -49,7 +49,11 @@ NEGLIGIBLE = Threshold(
     "share of a gain, of excess energy, of information on a parameter, that counts as none",
     "hand",
 )
-PROMISING = Threshold(0.5, "share of the price of a name an effect must promise to be fitted at all", "hand")
+PROMISING = Threshold(
+    0.5,
+    "share of the price of a name an effect must promise to be fitted, and gain beside all others to be kept",
+    "hand: less to be kept than to be taken, as in stepwise regression (Draper and Smith, ch. 15)",
+)
 SEARCHED = Threshold(2.0, "prices of a name an effect must gain to be searched without derivatives", "hand")
 DOUBTFUL_FIT = Threshold(1.5, "excess energy per block above which the search continues around a fit", "hand")
 
