@@ -45,6 +45,8 @@ _KNOWN = (
            "a gear that sticks at one angle of a turn"),
     _Known(("gear_friction",), r"(abs\(speed\)|speed)", "friction that falls with speed",
            "friction that grows with speed"),
+    _Known(("command", "motor_torque"), r"1", "motors that drive less forward and more backward",
+           "motors that drive more forward and less backward"),
     _Known(("command",), r"command", "motors that do less than they are told",
            "motors that do more than they are told"),
     _Known(("command",), r"sign\(command\)", "a dead band: the first part of a command is lost",
