@@ -171,7 +171,7 @@ def test_plot_of_what_is_no_run_is_one_line(gecar, words):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_a_run_that_is_stopped_is_saved_and_goes_on_to_the_same_end(gecar, tmp_path):
     """Ctrl-C on the command and its workers, as a terminal sends it."""
-    small = ("--population", "40", "--generations", "30", "--workers", "2", "--no-pictures")
+    small = ("--population", "40", "--generations", "30", "--draws", "1", "--no-pictures", "--workers", "2")
     process = start("evolve", *small, "--out", "stopped", cwd=tmp_path, start_new_session=True)
     _wait_for((tmp_path / "stopped/checkpoint").exists, process)
     os.killpg(process.pid, signal.SIGINT)
@@ -182,7 +182,7 @@ def test_a_run_that_is_stopped_is_saved_and_goes_on_to_the_same_end(gecar, tmp_p
     _wait_for(lambda: not _members(process.pid), None)
     assert len(read_history(tmp_path / "stopped")["best"]) < 31
     assert gecar("evolve", "--resume", "--out", "stopped", "--no-pictures", "--workers", 1).code == 0
-    assert gecar("evolve", *small[:-2], 1, "--no-pictures", "--out", "whole").code == 0
+    assert gecar("evolve", *small[:-1], 1, "--out", "whole").code == 0
     stopped, whole = (read_history(tmp_path / name) for name in ("stopped", "whole"))
     for column in set(whole) - {"wall_s"}:
         assert np.array_equal(stopped[column], whole[column], equal_nan=True), column

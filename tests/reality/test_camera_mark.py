@@ -16,8 +16,10 @@ from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
+from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
+MAYBE = ("track_width", "wheel_radius", "tyre_friction", "com_offset", "pose_delay", "motor_gain_asymmetry")
 MARK = (0.012, -0.007, math.radians(1.5))
 
 
@@ -59,11 +61,13 @@ def test_without_headings_no_mark_is_looked_for() -> None:
 @pytest.mark.parametrize("scale", [None, 1.05])
 def test_an_effect_is_found_beside_a_mark_and_only_the_mark_without_one(scale: float | None) -> None:
     robot = EV3.with_effects({"track_width": {"scale": scale}}) if scale else EV3
-    verdict = discover(Case("filmed", tuple(marked(recorded(robot, seed)) for seed in range(5))))
+    case = Case("filmed", tuple(marked(recorded(robot, seed)) for seed in range(5)))
+    verdict = discover(case, catalogue=[BY_ID[effect] for effect in MAYBE])
     assert [found.id for found in verdict.effects] == (["track_width"] if scale else [])
     (note,) = (note for note in verdict.notes if "mark" in note)
     assert "ahead of the axle's centre" in note
     assert "to its right" in note
+    assert "--mark 0.012" in note
     assert verdict.verdict == ("missing" if scale else "nothing")
     if scale:
         found = verdict.effects[0].parameters["scale"]

@@ -117,13 +117,10 @@ def _mark(fitted: Residuals) -> list[str]:
     if not (ahead or left or turned):
         return []
     along, across = "ahead of" if ahead > 0.0 else "behind", "left" if left > 0.0 else "right"
-    turn = "counter-clockwise" if turned > 0.0 else "clockwise"
-    place = (
-        f"{1e3 * abs(ahead):.1f} mm {along} the axle's centre and {1e3 * abs(left):.1f} mm to its {across}"
-    )
-    return [
-        f"The camera's mark lies {place}, turned by {math.degrees(abs(turned)):.1f} degrees {turn}. This was corrected."
-    ]
+    turn = f"{math.degrees(abs(turned)):.1f} degrees {'counter-' if turned > 0.0 else ''}clockwise"
+    where = f"{1e3 * abs(ahead):.1f} mm {along} the axle's centre, {1e3 * abs(left):.1f} mm to its {across}"
+    note = f"The camera's mark lies {where}, turned by {turn}. This was corrected"
+    return [f"{note}; gecar import --mark {ahead:.4f},{left:.4f} corrects recordings that it imports."]
 
 
 def _start(run: RecordingResiduals) -> str:

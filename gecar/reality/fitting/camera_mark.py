@@ -27,7 +27,9 @@ Array = npt.NDArray[np.float64]
 UNIT = np.array([2e-3, 2e-3, math.radians(0.5)])  # ahead, left [m], turned [rad]: steps of finite differences
 LARGEST = np.array([0.3, 0.3, 0.6]) / UNIT  # what `gecar calibrate` allows
 ROUNDS = 5
-TOLD_BY_ONE = 0.02  # share of what is known of it that other recordings must tell, or it stays where it was
+LEAST_TOLD = (
+    0.02  # share of what is known of it that other recordings must tell: else it is over the axle there
+)
 
 
 def with_fitted_mark(estimator: Estimator, physics: npt.NDArray[Any]) -> tuple[Residuals, float]:
@@ -47,5 +49,5 @@ def with_fitted_mark(estimator: Estimator, physics: npt.NDArray[Any]) -> tuple[R
     found = least_squares(residual, start, bounds, probes, ROUNDS)
     slopes = jacobian(residual, found.z, found.errors, probes, LARGEST)
     before = np.bincount(folds, costs(residual(start)))
-    left_out = left_out_costs(found, slopes, bounds, residual, folds, TOLD_BY_ONE)
+    left_out = left_out_costs(found, slopes, bounds, residual, folds, LEAST_TOLD)
     return residuals.with_mark(found.z * UNIT), float(np.sum(before - left_out))

@@ -314,10 +314,7 @@ class Problem:
         fitted, gain = with_fitted_mark(self.estimator, model.physics)
         if gain < max(least_gain, PRICE):
             return None
-        ahead, left, _ = fitted.mark
-        self.tell(
-            f"the camera's mark: {1e3 * ahead:.1f} mm ahead of the axle's centre, {1e3 * left:.1f} mm left"
-        )
+        self.tell("the camera's mark is not over the axle's centre: its place is fitted")
         return replace(self._on(fitted), mark_fitted=True)
 
     @property
