@@ -68,6 +68,9 @@ def test_an_effect_is_found_beside_a_mark_and_only_the_mark_without_one(scale: f
     assert "ahead of the axle's centre" in note
     assert "to its right" in note
     assert "--mark 0.012" in note
+    for channel in ("x_m", "y_m", "heading_deg"):  # whole drives set aside are judged with the mark, too
+        misfit = verdict.judgement.channels[channel]
+        assert misfit.after < 1.2 * misfit.floor
     assert verdict.verdict == ("missing" if scale else "nothing")
     if scale:
         found = verdict.effects[0].parameters["scale"]

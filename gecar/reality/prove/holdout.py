@@ -103,13 +103,14 @@ def replayed(run: RecordingResiduals, physics: Physics, start_s: float = np.inf)
     Parameters
     ----------
     run
-        The recording, with its clock as it was fitted.
+        The recording, with its camera's clock and mark as they were fitted.
     physics
         The robot, shape (1,).
     start_s
         Up to when poses tell the start [s]; without a pose by then, all of them do.
     """
     replayer = replayer_of(run.recording, run.noise.sd).with_clock(run.nuisances.clock_offset_s)
+    replayer = replayer.with_mark(run.nuisances.mark)
     t = replayer.inputs.pose_t
     within = start_s if len(t) and t[0] <= start_s else np.inf
     return Replayed(replayer, replayer.play(physics, replayer.aligned_start(physics, within)))
