@@ -64,6 +64,11 @@ class LinearResiduals:
     def with_clock_offsets(self, offsets_s: np.ndarray) -> LinearResiduals:
         return self  # no camera
 
+    mark = (0.0, 0.0, 0.0)
+
+    def with_mark(self, mark: Sequence[float]) -> LinearResiduals:
+        return self
+
     def later(self, seconds: float) -> LinearResiduals:
         return self  # no steps
 

@@ -209,12 +209,10 @@ def _wound_up(term: Term) -> str:
     """Name what grows with the angle turned since the start, which a store adds up."""
     if term.port != "yaw_moment" or term.store != "store + turn_rate":
         return ""
-    back = _single(term) is not None and term.constants[linear(term)[0]] < 0.0
-    return (
-        "a cable that winds up as the robot turns, and turns it back"
-        if back
-        else "a push that grows with turning"
-    )
+    found = _single(term)
+    if found and found[1] < 0.0:
+        return "a cable that winds up as the robot turns, and turns it back"
+    return "a push that grows with turning"
 
 
 def _stored(term: Term) -> str:

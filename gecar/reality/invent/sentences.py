@@ -30,7 +30,7 @@ _PLUS = re.compile(r" \+ (?=c\d*\b)")
 
 
 def physics_grammar(file: str = SHIPPED) -> Grammar:
-    """Load a language of laws; all short sentences are read, to check them, but for those of the shipped one.
+    """Load a language of laws, and check one that is not the shipped one by reading all of its short sentences.
 
     Raises
     ------

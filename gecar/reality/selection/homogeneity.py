@@ -9,7 +9,7 @@ variance that exceeds sampling noise).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,20 +71,20 @@ def drifts(problem: Problem, model: Model, step: Step) -> bool:
     unknown = tuple(model.errors for model in problem.estimator.models_of(step))
     known = _beside_small_changes(problem, model, step.effect)
     splits = list(_splits(problem, model))
-    chance = SIGNIFICANCE / len(splits)  # Bonferroni
-    return all(
-        any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
-        for errors, least in ((unknown, DRIFTING), (known, BESIDE_CHANGES))
-    )
+    return _differs_in_any(splits, unknown, DRIFTING) and _differs_in_any(splits, known, BESIDE_CHANGES)
 
 
-def is_elsewhere(problem: Problem, with_mark: Problem, model: Model) -> bool:
-    """Whether what was fitted as the camera's mark differs between recordings, times or regimes: a mark stays."""
+def mark_differs(problem: Problem, with_mark: Problem, model: Model) -> bool:
+    """Whether the camera's mark, as it was fitted, differs between recordings, times or regimes: then it is none."""
     whitened, physics = problem.estimator.whitened, model.physics
-    without, with_it = (whitened(each.residuals.errors(physics)) for each in (problem, with_mark))
-    splits = list(_splits(problem, model))
-    chance = SIGNIFICANCE / len(splits)
-    return any(_differs(heterogeneity(groups, without, with_it), DRIFTING, chance) for groups in splits)
+    errors = tuple(whitened(each.residuals.errors(physics)) for each in (problem, with_mark))
+    return _differs_in_any(list(_splits(problem, model)), errors, DRIFTING)
+
+
+def _differs_in_any(splits: Sequence[Groups], errors: tuple[Array, ...], least: float) -> bool:
+    """Whether a size differs in one of several splits; ``errors`` are whitened, without what has it and with it."""
+    chance = SIGNIFICANCE / len(splits)  # Bonferroni
+    return any(_differs(heterogeneity(groups, *errors), least, chance) for groups in splits)
 
 
 def _differs(found: Heterogeneity, least: float, chance: float) -> bool:

@@ -55,8 +55,8 @@ class Problem:
         The robot with nothing fitted.
     tell
         Called with a line of progress.
-    clocks_fitted, mark_fitted
-        Whether each camera's clock offset was fitted, and the place of its mark on the robot.
+    clocks_fitted
+        Whether each camera's clock offset was fitted.
     refused
         Effects of the catalogue that are not tried, as recordings set aside do not confirm them.
     worth
@@ -74,7 +74,6 @@ class Problem:
     known: Model
     tell: Callable[[str], None]
     clocks_fitted: bool = False
-    mark_fitted: bool = False
     refused: frozenset[str] = frozenset()
     worth: Mapping[str, float] = field(default_factory=dict)
     place: Hashable = ()
@@ -266,7 +265,7 @@ class Problem:
         """Return recordings set aside with this problem's mark, and clocks fitted to them if this problem's were."""
         if held.sensor:
             return held
-        held = held.with_mark(self.residuals.mark) if self.mark_fitted else held
+        held = held.with_mark(self.residuals.mark)
         return with_fitted_clocks(held, physics)[0] if self.clocks_fitted else held
 
     def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
@@ -303,6 +302,11 @@ class Problem:
                 break
         return problem if before - now >= PRICE else None
 
+    @property
+    def mark_fitted(self) -> bool:
+        """Whether the place of the camera's mark on the robot was fitted."""
+        return any(self.residuals.mark)
+
     def with_mark(self, model: Model, least_gain: float = 0.0) -> Problem | None:
         """Return the problem with the camera's mark fitted under a model; None where too little is gained by it.
 
@@ -312,10 +316,7 @@ class Problem:
         if self.residuals.sensor or self.on_bench or not headings:
             return None
         fitted, gain = with_fitted_mark(self.estimator, model.physics)
-        if gain < max(least_gain, PRICE):
-            return None
-        self.tell("the camera's mark is not over the axle's centre: its place is fitted")
-        return replace(self._on(fitted), mark_fitted=True)
+        return self._on(fitted) if gain >= max(least_gain, PRICE) else None
 
     @property
     def is_beyond_constants(self) -> bool:

@@ -25,7 +25,7 @@ from gecar.reality.selection.acceptance import (
     stopped,
 )
 from gecar.reality.selection.cross_validation import judged
-from gecar.reality.selection.homogeneity import drifts, is_elsewhere
+from gecar.reality.selection.homogeneity import drifts, mark_differs
 from gecar.reality.selection.motor_constants import CONSTANTS, with_constants
 from gecar.reality.selection.problem import COMMON_DELAY, Problem
 from gecar.reality.selection.screening import candidate_steps, step_of
@@ -437,4 +437,7 @@ def _with_camera_beside(problem: Problem, model: Model) -> Problem | None:
 def _with_mark(problem: Problem, model: Model, least_gain: float = 0.0) -> Problem | None:
     """Return the problem with the camera's mark fitted; None where that gains too little, or is no mark."""
     found = problem.with_mark(model, least_gain)
-    return None if found is None or is_elsewhere(problem, found, model) else found
+    if found is None or mark_differs(problem, found, model):
+        return None
+    problem.tell("the camera's mark is not over the axle's centre: its place is fitted")
+    return found

@@ -62,8 +62,8 @@ def limits(problem: Problem, model: Model, held: Residuals) -> dict[str, Limit |
     """
     others = [effect for effect in problem.catalogue if effect not in model.effects]
     rivals = dict(zip(others, map(_directions, problem.estimator.sensitivities(model, others)), strict=True))
-    clocked = problem.with_its_camera(held, model.physics)
-    aside = _Held(clocked, clocked.errors(model.physics), clocked.errors(problem.with_small_changes(model)))
+    filmed = problem.with_its_camera(held, model.physics)
+    aside = _Held(filmed, filmed.errors(model.physics), filmed.errors(problem.with_small_changes(model)))
     none = problem.residuals.errors(model.physics)
     return {effect: _Search(problem, model, none, aside, rivals, effect).limit() for effect in others}
 
