@@ -108,6 +108,25 @@ def test_a_wheel_that_lifts_its_axle_as_it_turns_is_held_back_by_its_load():
     assert np.abs(other - plain)[:, 7].max() > 0.1  # rad/s
 
 
+def test_contacts_that_are_not_beside_one_another_scrub_as_the_robot_turns():
+    # A wavy tread puts its contact a n r cos(n angle) ahead of the axle: a turn then rubs with the grip of one wheel.
+    duty = np.full(len(RECORDING.left_duty), 0.4)
+    turning = replayer_of(replace(RECORDING, left_duty=-duty, right_duty=duty))
+    body, share, waves = NOMINAL.body, 0.025, 8
+    load = 0.5 * MASS * 9.81 * (1.0 - body.com_ahead / body.caster_ahead)
+    moment = NOMINAL.tyre.friction * load * share * waves * body.wheel_radius * 2.0 / math.pi  # on the mean
+    wavy = Term(port="rolling_radius", law="a * sin(n * angle)", a=share, n=waves, side="right")
+    turns = [
+        turning.play(robot.physics).rows[-1, 6]
+        for robot in (
+            NOMINAL,
+            law("yaw_moment", "-m * tanh(turn_rate / 0.02)", m=moment),
+            NOMINAL.with_terms([wavy]),
+        )
+    ]
+    assert turns[2] - turns[0] == pytest.approx(turns[1] - turns[0], rel=0.1)
+
+
 def test_terms_add_up_and_sides_are_told_apart():
     whole = law("motor_torque", "a", a=0.02)
     halves = NOMINAL.with_terms([Term(port="motor_torque", law="a", a=0.01)] * 2)

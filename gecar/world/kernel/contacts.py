@@ -19,12 +19,12 @@ from gecar.compiled import kernel
 @kernel
 def release_contacts(s: Any) -> None:
     """Take all impulses off; sweeps then find those of this step."""
-    s.left_friction = s.right_friction = 0.0
+    s.left_friction = s.right_friction = s.scrub = 0.0
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
 
 
 @kernel
-def sweep(s: Any, c: Any, effects: bool = True) -> bool:
+def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
     """Go once over shafts, tyres and caster, and give each what it asks for or all it can get.
 
     Three sweeps suffice, and mostly one does.
@@ -35,6 +35,8 @@ def sweep(s: Any, c: Any, effects: bool = True) -> bool:
         Records of dtypes `STATE`, whose speeds and impulses are updated, and `DERIVED`.
     effects
         False where the robot has no play and no drag at the caster; see `gecar.world.kernel.dynamics.begin_step`.
+    terms
+        Whether the robot has terms, which may move a wheel's contact ahead of the axle.
 
     Returns
     -------
@@ -43,6 +45,9 @@ def sweep(s: Any, c: Any, effects: bool = True) -> bool:
     """
     settled = _rub_shafts(s, c)
     sliding = _roll(s, c, effects)
+    if terms and c.apart != 0.0:
+        _scrub(s, c)
+        sliding = True
     if effects and s.caster_circle > 0.0:
         _drag_caster(s, c)
         return False
@@ -116,6 +121,20 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
     _push(s, left, right, left_side, right_side, c)
     return s.left_slides != 0.0 or s.right_slides != 0.0 or plays_l or plays_r
+
+
+@kernel
+def _scrub(s: Any, c: Any) -> None:
+    """Give both tyres opposed side impulses that would end the turn, within what their circles leave.
+
+    Contacts that are not beside one another cannot both roll while the robot turns: they slip to opposite sides.
+    """
+    left = s.left_circle * s.left_circle - s.left_push * s.left_push
+    right = s.right_circle * s.right_circle - s.right_push * s.right_push
+    most = c.apart * math.sqrt(max(min(left, right), 0.0))
+    scrub = min(max(s.scrub - s.yaw_rate / c.inv_inertia, -most), most)
+    s.yaw_rate += (scrub - s.scrub) * c.inv_inertia
+    s.scrub = scrub
 
 
 @kernel

@@ -136,8 +136,8 @@ def step_with_terms(
     asked = load_asked(scratch, 1, 0)
     if asked.shape_terms > 0.0:
         reshape(p, asked, c)
-    if not begin_as_asked(s, left_duty, right_duty, p, c, asked) and not sweep(s, c, True):
-        sweep(s, c, True)
+    if not begin_as_asked(s, left_duty, right_duty, p, c, asked) and not sweep(s, c, True, True):
+        sweep(s, c, True, True)
     end_step(s, p, c, True)
 
 
@@ -178,7 +178,7 @@ def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, 
     )
     s.caster_circle = max(s.caster_circle + asked.caster_friction * _caster_load(s, c) * c.dt, 0.0)
     release_contacts(s)
-    return sweep(s, c, True)
+    return sweep(s, c, True, True)
 
 
 @kernel
@@ -211,6 +211,8 @@ def bench_step_with_terms(
 @kernel
 def reshape(p: Any, asked: Any, c: Any) -> None:
     """Let the radii, the track and the play be what terms make of them in a step."""
+    c.axle = 0.5 * (asked.left_contact + asked.right_contact) - p.com_ahead
+    c.apart = abs(asked.right_contact - asked.left_contact)
     roll_on(p, asked.left_rolling_radius, asked.right_rolling_radius, asked.track_width, c)
     c.left_gap = 0.5 * max(p.backlash + asked.left_gear_play, 0.0)
     c.right_gap = 0.5 * max(p.backlash + asked.right_gear_play, 0.0)

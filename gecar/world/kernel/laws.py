@@ -38,7 +38,7 @@ VIEW = np.dtype([(f"{hand}_{name}", np.float64) for name in VARIABLE for hand in
 
 OF_BODY = PORTS[: PORT_NUMBER["encoder_reading"]]
 ASKED_OF_PORT = [(f"left_{port.id}", f"right_{port.id}") if port.of_wheel else (port.id,) for port in OF_BODY]
-ASKED_FIELDS = (*itertools.chain(*ASKED_OF_PORT), "shape_terms")
+ASKED_FIELDS = (*itertools.chain(*ASKED_OF_PORT), "left_contact", "right_contact", "shape_terms")
 ASKED = np.dtype([(field, np.float64) for field in ASKED_FIELDS])
 """What terms ask for at the ports of the dynamics in a step."""
 

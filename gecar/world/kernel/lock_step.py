@@ -70,7 +70,7 @@ def advance_lanes(flat: npt.NDArray[np.float64], lanes: int, effects: bool) -> N
         unsettled += 0 if settled else 1
         store_state(flat, lanes, lane, s)
         store_acting(flat, lanes, lane, a)
-    _finish(flat, lanes, effects, unsettled)
+    _finish(flat, lanes, effects, False, unsettled)
 
 
 @kernel
@@ -121,19 +121,19 @@ def advance_lanes_with_terms(
         unsettled += 0 if settled else 1
         store_state(flat, lanes, lane, s)
         store_acting(flat, lanes, lane, a)
-    _finish(flat, lanes, True, unsettled)
+    _finish(flat, lanes, True, True, unsettled)
 
 
 @kernel
-def _finish(flat: npt.NDArray[np.float64], lanes: int, effects: bool, unsettled: int) -> None:
+def _finish(flat: npt.NDArray[np.float64], lanes: int, effects: bool, terms: bool, unsettled: int) -> None:
     """Sweep until all contacts are settled, and end the step."""
     if unsettled > 0:
         for lane in range(lanes):
             s = load_state(flat, lanes, lane)
             c = load_derived(flat, lanes, lane)
             a = load_acting(flat, lanes, lane)
-            if a.settled == 0.0 and not sweep(s, c, effects):
-                sweep(s, c, effects)
+            if a.settled == 0.0 and not sweep(s, c, effects, terms):
+                sweep(s, c, effects, terms)
             store_state(flat, lanes, lane, s)
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)

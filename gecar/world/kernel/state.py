@@ -16,7 +16,7 @@ _STATE_FIELDS = (
     "t x y heading cos sin vx vy yaw_rate "
     "left_angle right_angle left_speed right_speed left_play right_play "
     "left_push right_push left_side right_side caster_push caster_side "
-    "left_friction right_friction left_slides right_slides "
+    "left_friction right_friction left_slides right_slides scrub "
     "left_duty right_duty left_integral right_integral battery_current "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
     "half_turn u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
@@ -25,7 +25,7 @@ _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain left_dead right_dead slew torque lean "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
-    "weight caster_static caster_arm transfer_side left_gap right_gap tilt_x tilt_y sliding ripple "
+    "weight caster_static caster_arm transfer_side left_gap right_gap apart tilt_x tilt_y sliding ripple "
     "regulator_p regulator_i"
 )
 
@@ -56,6 +56,7 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.inv_mass = 1.0 / p.mass
     c.inv_inertia = 1.0 / p.yaw_inertia
     c.axle = -p.com_ahead
+    c.apart = 0.0
     c.caster = p.caster_ahead - p.com_ahead
     _rotor(p, dt, c)
     c.left_gain = 1.0 - 0.5 * p.gain_difference
@@ -158,7 +159,7 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.t = s.vx = s.vy = s.yaw_rate = for_zero
     s.left_angle = s.right_angle = s.left_speed = s.right_speed = s.left_play = s.right_play = for_zero
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = for_zero
-    s.left_slides = s.right_slides = for_zero
+    s.left_slides = s.right_slides = s.scrub = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
     s.heading = heading

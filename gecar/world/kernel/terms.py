@@ -70,9 +70,9 @@ _TOWARD, _POSE_TOWARD, _POSE_TURN = (PORT_NUMBER[name] for name in AT_A_POINT)
 _RADIUS, _PLAY, _TRACK = (PORT_NUMBER[name] for name in ("rolling_radius", "gear_play", "track_width"))
 _ASKED_AT = np.array([ASKED_FIELDS.index(names[0]) for names in ASKED_OF_PORT])
 _OF_WHEEL = np.array([port.of_wheel for port in OF_BODY])
-_TORQUE, _FORCE_X, _FORCE_Y, _SUPPLY, _SHAPE = (
+_TORQUE, _FORCE_X, _FORCE_Y, _SUPPLY, _CONTACT, _SHAPE = (
     ASKED_FIELDS.index(name)
-    for name in ("left_motor_torque", "force_x", "force_y", "supply_voltage", "shape_terms")
+    for name in ("left_motor_torque", "force_x", "force_y", "supply_voltage", "left_contact", "shape_terms")
 )
 
 
@@ -199,9 +199,10 @@ def _way_to_point(robot: Any, k: int, seen: Array, lanes: int, lane: int) -> tup
 
 @kernel
 def _lift(robots: npt.NDArray[Any], alike: bool, k: int, side: int, scratch: Array, lanes: int) -> None:
-    """Add the torque on a wheel's shaft as the wheel, which is not round, lifts or lowers the axle [N m].
+    """Add the torque on the shaft of a wheel that is not round, which lifts the axle [N m], and move its contact [m].
 
-    By virtual work, load times what the radius grows by a radian: a term at ``rolling_radius`` gives a share of it.
+    What the radius grows by a radian is how far ahead of the axle the wheel touches the floor [m]; by virtual work,
+    load times that is the torque. A term at ``rolling_radius`` gives a share of the radius.
     """
     angle, load, values, kept = 2 * _ANGLE * lanes, 2 * _LOAD * lanes, AT_VALUES * lanes, AT_KEPT * lanes
     for each in range(2 * lanes):
@@ -217,7 +218,10 @@ def _lift(robots: npt.NDArray[Any], alike: bool, k: int, side: int, scratch: Arr
         for each in (lane, lanes + lane):
             scratch[angle + each] = scratch[kept + each]
             grown = scratch[kept + 2 * lanes + each] - scratch[values + each]
-            scratch[values + each] = -scratch[load + each] * radius * grown / (2.0 * _APART)
+            scratch[values + each] = radius * grown / (2.0 * _APART)
+    _add(_CONTACT, side, scratch, lanes)
+    for each in range(2 * lanes):
+        scratch[values + each] *= -scratch[load + each]
     _add(_TORQUE, side, scratch, lanes)
 
 
