@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.concealed.kinds import MET, SETS
 from benchmarks.concealed.runner import DISCOVER, run_all
 from benchmarks.concealed.worlds import WORLDS
 
@@ -71,11 +72,12 @@ def _parser() -> argparse.ArgumentParser:
     plan = commands.add_parser("plan", help="draw and seal a whole examination; resumes")
     plan.add_argument("--seed", type=int, required=True)
     _ask_counts(plan)
-    plan.add_argument("--last", action="store_true", help="also the kinds kept for the last examination")
     plan.add_argument(
-        "--final",
-        action="store_true",
-        help="what is outside the catalogue is of the final set of kinds (final_kinds.py), and of no other",
+        "--kinds",
+        choices=SETS,
+        default=MET,
+        help="from which set physics outside the catalogue is drawn: that met so far (default); last: also what was "
+        "kept for a last examination; final, unmet: of these sets alone",
     )
     plan.add_argument(
         "--pace",
@@ -228,8 +230,7 @@ def _plan(chosen: argparse.Namespace) -> int:
         chosen.seed,
         _by_world(chosen),
         background=background,
-        last=chosen.last,
-        final=chosen.final,
+        kinds=chosen.kinds,
         pace=chosen.pace,
         without=chosen.without,
         material=chosen.material,

@@ -18,9 +18,8 @@ from benchmarks.concealed.background import Background, draw_background
 from benchmarks.concealed.commands import SECONDS, line_follower, script
 from benchmarks.concealed.detectability import visibility
 from benchmarks.concealed.effects import EFFECTS, Exactly, Rng
-from benchmarks.concealed.final_kinds import FINAL
 from benchmarks.concealed.history import ROW_TICKS, Array, Controller, Pose, ToppledError, replayed
-from benchmarks.concealed.outside import OUTSIDE
+from benchmarks.concealed.kinds import ALL_OUTSIDE
 from benchmarks.concealed.recording import (
     ANGLES,
     CHANNELS,
@@ -33,13 +32,11 @@ from benchmarks.concealed.recording import (
 )
 from benchmarks.concealed.rehearsal import Act, Rehearsal, along, stacked, tuned
 from benchmarks.concealed.robot import NEUTRAL, Base, Concealed
-from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import RUNS, Setting, draw_setting
 from benchmarks.concealed.sizes import is_material, size
 from benchmarks.concealed.worlds import truth
 
 KINDS = ("none", "single", "double", "triple", "mixed", "outside")
-ALL_OUTSIDE = {**OUTSIDE, **SEALED, **FINAL}
 SENSORS = {"light": {"reflection_pct"}, "camera": set(POSE), "encoders": set(ANGLES)}
 FASTER = "faster"  # folder of sealed recordings, see `Manner`
 _HELD_OUT = 2  # recordings to judge by, where there are enough

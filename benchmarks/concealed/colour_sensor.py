@@ -16,6 +16,7 @@ _HALF = LINE_WIDTH / 2.0
 _OUTER = (0.15 - _HALF, 0.15 - _HALF, 2.25 + _HALF, 1.05 + _HALF)  # x0, y0, x1, y1
 _INNER = (0.15 + _HALF, 0.15 + _HALF, 2.25 - _HALF, 1.05 - _HALF)
 _SLICES = 24
+_DIMMEST = 10.0  # %: a gain that follows the mean light grows no further
 
 
 def line_share(x: float, y: float, diameter: float) -> float:
@@ -85,6 +86,7 @@ class ColourSensor:
         self._level = math.nan
         lag = concealed.sensor_lag
         self._follow = 1.0 - math.exp(-TICK_S / lag) if lag > 0.0 else 1.0
+        self._mean = math.nan  # of the light, for a gain that follows it [%]
         self._ticks = 0
         self._before: tuple[float, float] | None = None  # where the mount was a tick ago [m]
         self._swing = [
@@ -119,8 +121,16 @@ class ColourSensor:
             light *= (
                 1.0 + share * (math.sin(2.0 * math.pi * hertz * self._ticks * TICK_S + phase) - 1.0) / 2.0
             )
+        if self._hidden.auto_gain is not None:
+            light *= self._gain(light)
         self._ticks += 1
         return self._hidden.sensor_gain * light + self._hidden.sensor_offset_pct
+
+    def _gain(self, light: float) -> float:
+        """Let a gain follow the mean light; it is 1 over white, where the sensor was calibrated."""
+        power, time = self._hidden.auto_gain or (0.0, 1.0)
+        self._mean = light if math.isnan(self._mean) else self._mean + TICK_S / time * (light - self._mean)
+        return float((max(self._mean, _DIMMEST) / 100.0) ** -power)
 
     def _floor(self, x: float, y: float, heading: float) -> float:
         hidden = self._hidden
@@ -132,12 +142,15 @@ class ColourSensor:
         spot_x = x + cos * ahead - sin * left
         spot_y = y + sin * ahead + cos * left
         shade = self._shade(spot_x, spot_y)
-        dx, dy, angle = hidden.line_shift
-        if (dx, dy, angle) != (0.0, 0.0, 0.0):
-            cos, sin = math.cos(angle), math.sin(angle)
-            spot_x, spot_y = spot_x - dx, spot_y - dy
-            spot_x, spot_y = cos * spot_x + sin * spot_y, cos * spot_y - sin * spot_x
-        light = 100.0 * (1.0 - line_share(spot_x, spot_y, hidden.spot_diameter))
+        other = None
+        if hidden.second_spot is not None:
+            _, on, aside = hidden.second_spot
+            other = self._printed(spot_x + cos * on - sin * aside, spot_y + sin * on + cos * aside)
+        spot_x, spot_y = self._printed(spot_x, spot_y)
+        dark = line_share(spot_x, spot_y, hidden.spot_diameter)
+        if hidden.second_spot is not None and other is not None:
+            dark += hidden.second_spot[0] * (line_share(*other, hidden.spot_diameter) - dark)
+        light = 100.0 * (1.0 - dark)
         if hidden.ambient is not None:
             loss, source = hidden.ambient
             light *= 1.0 - loss * (1.0 - math.cos(heading - source)) / 2.0
@@ -150,6 +163,15 @@ class ColourSensor:
             shine = math.sin(turn * spot_x + phase_x) * math.sin(turn * spot_y + phase_y)
             light *= 1.0 - share * (1.0 + shine) / 2.0
         return light
+
+    def _printed(self, x: float, y: float) -> tuple[float, float]:
+        """Give a place on the floor in the frame of the course as it is printed there."""
+        dx, dy, angle = self._hidden.line_shift
+        if (dx, dy, angle) == (0.0, 0.0, 0.0):
+            return x, y
+        cos, sin = math.cos(angle), math.sin(angle)
+        x, y = x - dx, y - dy
+        return cos * x + sin * y, cos * y - sin * x
 
     def _shade(self, x: float, y: float) -> float:
         """Give the share of light that a shadow takes, whose edge is straight and blurred."""

@@ -12,6 +12,8 @@ from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 _LIMITER_GAIN = 20.0  # V s / rad: the speed limiter lets go of the whole supply within 0.4 rad/s
 _TOOTH_BLEND = 0.2  # rad/s: below this a damaged tooth lets go, so that it cannot drive the robot
 _RUB_BLEND = 0.5  # rad/s: below this difference of speeds the axles' rubbing fades out
+_LOSS_BLEND = 0.2  # rad/s: below this what gears lose fades out, so that it cannot drive the robot
+_GREASE_BLEND = 0.3  # rad/s: below this grease, being a liquid, gives way
 _BAND_SLIPS = 10.0  # rad: a rubber band round the axle slips rather than winding up for ever
 
 
@@ -44,6 +46,13 @@ class DriveTrain:
         self._varying_friction = concealed.static_friction > 0.0
         self._driven_at = [[-math.inf, -math.inf], [-math.inf, -math.inf]]  # s, by side: backward, forward
         self._kept = [0.0, 0.0]  # shares of the supply that the firmware adds to keep the speed
+        self._polled: tuple[float, tuple[float, float]] = (
+            0.0,
+            (0.0, 0.0),
+        )  # when commands were looked for, and seen
+        self._held: list[float | None] = [None, None]  # angles at which the motors were stopped [rad]
+        self._softened = 0.0  # share of a grease's stiffness that is worked away
+        self._sagged = 0.0  # V, of the battery's slow part
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
         """Pass one tick's command through delay, ramp, cap and dead band.
@@ -63,6 +72,12 @@ class DriveTrain:
         for start, length in self._hidden.dropouts:
             if start <= time_s < start + length:
                 command_pct = (0.0, 0.0)
+        if self._hidden.latch is not None:
+            period, gone = self._hidden.latch
+            ticking = math.floor(time_s / period + gone)
+            if ticking > self._polled[0]:
+                self._polled = ticking, command_pct
+            command_pct = self._polled[1]
         self._queue.append(command_pct)
         late = self._queue.popleft()
         most = self._hidden.command_slew * TICK_S
@@ -123,6 +138,8 @@ class DriveTrain:
         """
         if self._hidden.keeper is not None:
             duties = self._keep(0, duties[0], speeds[0]), self._keep(1, duties[1], speeds[1])
+        if self._hidden.holding > 0.0:
+            duties = self._hold(0, duties[0], angles[0]), self._hold(1, duties[1], angles[1])
         terminal = self._terminal(duties, speeds, time_s)
         torques = tuple(
             self._torque(i, duties[i] * terminal, speeds[i], angles[i])
@@ -155,9 +172,19 @@ class DriveTrain:
         self._kept[side] = kept if duty != 0.0 else 0.0
         return min(max(duty + self._kept[side], -1.0), 1.0)
 
+    def _hold(self, side: int, duty: float, angle: float) -> float:
+        """Drive a motor that is given nothing back to where it was when that began."""
+        held = self._held[side]
+        if duty != 0.0 or held is None:
+            self._held[side] = held = angle
+        wanted = self._hidden.holding * (held - angle)
+        return duty if duty != 0.0 else min(max(wanted, -DUTY_CAP), DUTY_CAP)
+
     def _terminal(self, duties: tuple[float, float], speeds: tuple[float, float], time_s: float) -> float:
         """Voltage at the terminals: a chopper draws duty x motor current from a source behind a resistance."""
         source = self._base.supply * self._hidden.supply_scale - self._hidden.battery_drain * time_s
+        if self._hidden.slow_sag is not None:
+            source = self._sag(source, duties, speeds)
         inner = self._hidden.battery_resistance
         if inner == 0.0:
             return source
@@ -168,6 +195,17 @@ class DriveTrain:
             / self._base.resistance
         )
         return (source + inner * back) / (1.0 + inner * load)
+
+    def _sag(self, source: float, duties: tuple[float, float], speeds: tuple[float, float]) -> float:
+        """Let the battery's slow part follow the current drawn; give what is left of the source's voltage [V]."""
+        resistance, time = self._hidden.slow_sag or (0.0, 1.0)
+        left = source - self._sagged
+        drawn = sum(
+            duty * (duty * left - self._base.back_emf_constant * speed) / self._base.resistance
+            for duty, speed in zip(duties, speeds, strict=True)
+        )
+        self._sagged += TICK_S / time * (resistance * drawn - self._sagged)
+        return left
 
     def _torque(self, side: int, volts: float, speed: float, angle: float) -> float:
         hidden = self._hidden
@@ -204,7 +242,18 @@ class DriveTrain:
                 torque -= size * math.tanh(speed / _TOOTH_BLEND)
         if hidden.rubber_band is not None and hidden.rubber_band[1] == side:
             torque -= hidden.rubber_band[0] * angle / (1.0 + abs(angle) / _BAND_SLIPS)
+        if hidden.gear_loss is not None and hidden.gear_loss[1] == side:
+            torque -= hidden.gear_loss[0] * abs(usual) * math.tanh(speed / _LOSS_BLEND)
+        if hidden.grease is not None and hidden.grease[3] == side:
+            torque -= self._stiffness(speed) * math.tanh(speed / _GREASE_BLEND)
         return torque
+
+    def _stiffness(self, speed: float) -> float:
+        """Work grease soft by turning, while it stiffens with time; give its torque [N m]."""
+        torque, rest, shear, _ = self._hidden.grease or (0.0, 1.0, 1.0, 0)
+        left = 1.0 - self._softened
+        self._softened += TICK_S * (abs(speed) / shear * left - self._softened / rest)
+        return torque * left
 
     def _limited(self, volts: float, speed: float) -> float:
         """Take voltage away so that the motor's own torque never drives it above the limit; it may coast there."""

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.concealed.cases import (
-    ALL_OUTSIDE,
     SENSORS,
     Manner,
     broken_seals,
@@ -21,11 +20,11 @@ from benchmarks.concealed.cases import (
     unlike_neutral,
 )
 from benchmarks.concealed.effects import EFFECTS
-from benchmarks.concealed.final_kinds import FINAL
-from benchmarks.concealed.outside import OUTSIDE
-from benchmarks.concealed.sealed_kinds import SEALED
+from benchmarks.concealed.kinds import ALL_OUTSIDE, MET, SETS
+from benchmarks.concealed.kinds.outside import OUTSIDE
 from benchmarks.concealed.worlds import holds
 
+_MIXED = (MET, "last")  # sets that hold the kinds of the first examinations, and later ones
 _ALIKE = 1.0 / 3.0  # share of pairs from one group
 
 
@@ -60,11 +59,10 @@ def plan(
     counts: Counts | Mapping[str, Counts],
     *,
     background: bool = False,
-    last: bool = False,
+    kinds: str = MET,
     pace: float = 1.0,
     without: str = "",
     material: bool = False,
-    final: bool = False,
 ) -> list[Planned]:
     """List the cases of an examination.
 
@@ -76,16 +74,14 @@ def plan(
         How many of each kind, in MuJoCo's world or by world.
     background
         Whether robots have a background; see :class:`benchmarks.concealed.cases.Manner`.
-    last
-        Whether the kinds of ``SEALED`` kept for the last examination are drawn, too.
+    kinds
+        One of ``SETS``, from which physics outside the catalogue is drawn.
     pace
         Share of the usual duties; see :class:`benchmarks.concealed.cases.Manner`.
     without
         A sensor that no case has; what it alone shows is not concealed.
     material
         Whether all that is concealed is material; see :class:`benchmarks.concealed.cases.Manner`.
-    final
-        Whether the kinds outside the catalogue are those of ``FINAL``, and no others.
 
     Returns
     -------
@@ -96,8 +92,8 @@ def plan(
     contents: list[tuple[str, tuple[str, ...], Manner]] = []
     for world, each in (counts if isinstance(counts, Mapping) else {"mujoco": counts}).items():
         manner = Manner(world, background, pace, without, material)
-        kinds = outside_kinds(manner, last=last, final=final)
-        contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, kinds)]
+        drawable = outside_kinds(manner, kinds)
+        contents += [(kind, effects, manner) for kind, effects in _contents(each, rng, manner, drawable)]
     order = rng.permutation(len(contents))
     return [
         Planned(f"c{place + 1:03d}", *contents[index][:2], (seed, 1 + int(index)), contents[index][2])
@@ -105,30 +101,26 @@ def plan(
     ]
 
 
-def outside_kinds(manner: Manner, *, last: bool, final: bool = False) -> list[str]:
-    """List the kinds outside the catalogue that can be drawn: without a background, those of the first examinations.
+def outside_kinds(manner: Manner, kinds: str = MET) -> list[str]:
+    """List the kinds outside the catalogue that can be drawn.
 
     Parameters
     ----------
     manner
         Of the cases.
-    last
-        Whether kinds kept for the last examination are among them.
-    final
-        Whether they are those of ``FINAL``, all of them kept, and no others: had they joined the rest, no seed would
-        draw what it drew before.
+    kinds
+        One of ``SETS``. Without a background, ``met`` and ``last`` are both those of the first examinations.
 
     Returns
     -------
     list[str]
     """
-    kinds = FINAL if final else {**OUTSIDE, **SEALED} if manner.background else OUTSIDE
+    drawable = SETS[kinds] if manner.background or kinds not in _MIXED else OUTSIDE
     rng = np.random.default_rng(0)
     return [
         name
-        for name, kind in kinds.items()
-        if (last or final or not kind.last)
-        and holds(manner.world, unlike_neutral(kind.draw(rng, 1, 0.0)[0][0]))
+        for name, kind in drawable.items()
+        if holds(manner.world, unlike_neutral(kind.draw(rng, 1, 0.0)[0][0]))
     ]
 
 

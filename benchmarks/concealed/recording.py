@@ -279,14 +279,17 @@ def write_robot(folder: Path, base: Base) -> None:
 def seen_pose(
     history: History, concealed: Concealed, ticks: Ticks, late_s: float
 ) -> tuple[Array, Array, Array]:
-    """Pose as the camera has it: of its marker, late, through its lens, from its slowly turning mount."""
+    """Pose as the camera has it: of its marker, late, from aslant, through its lens, from its slowly turning mount."""
     times = history.time_s[ticks]
-    pose = np.stack([np.interp(times - late_s, history.time_s, column) for column in history.pose.T])
+    shown = times - late_s if concealed.frame_rate == 0.0 else times / (1.0 + concealed.frame_rate) - late_s
+    pose = np.stack([np.interp(shown, history.time_s, column) for column in history.pose.T])
     ahead, left = concealed.marker
     if (ahead, left) != (0.0, 0.0):
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         pose[:2] += [cos * ahead - sin * left, sin * ahead + cos * left]
     away = pose[:2] - np.array(FIELD)[:, None] / 2.0
+    if concealed.keystone != (0.0, 0.0):
+        away, pose[2] = _askew(away, pose[2], np.array(concealed.keystone))
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))
     turn = math.radians(concealed.pose_drift_deg) * times + math.radians(concealed.camera_turn_deg)
     if concealed.camera_bump is not None:
@@ -297,3 +300,13 @@ def seen_pose(
     x = FIELD[0] / 2.0 + np.cos(turn) * away[0] - np.sin(turn) * away[1]
     y = FIELD[1] / 2.0 + np.sin(turn) * away[0] + np.cos(turn) * away[1]
     return x, y, pose[2] + turn
+
+
+def _askew(away: Array, heading: Array, scale_falls: Array) -> tuple[Array, Array]:
+    """See places (2, rows) and headings from aslant: a plane's perspective, right in the field's middle."""
+    depth = 1.0 + scale_falls @ away
+    seen = away / depth
+    ahead = np.stack([np.cos(heading), np.sin(heading)])
+    bent = ahead - seen * (scale_falls @ ahead)  # how the image moves as the robot moves ahead
+    across = ahead[0] * bent[1] - ahead[1] * bent[0]
+    return seen, heading + np.arctan2(across, np.sum(ahead * bent, axis=0))

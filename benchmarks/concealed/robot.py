@@ -161,6 +161,24 @@ class Concealed:
     )
     marker: tuple[float, float] = (0.0, 0.0)  # where the camera's marker sits, ahead and left of the axle [m]
 
+    # Outside the catalogue, from the fourth set of kinds.
+    gear_loss: tuple[float, int] | None = None  # share of a motor's torque that its gears lose, side
+    # Torque of stiff grease [N m], time in which it stiffens [s], turn that works it soft [rad], side.
+    grease: tuple[float, float, float, int] | None = None
+    # Torque per acceleration sideways [N m s^2/m], which way the robot turns then (1: left), side.
+    frame_rub: tuple[float, float, int] | None = None
+    hair: tuple[float, float] | None = None  # greatest drag at the caster [N], way ahead it takes [m]
+    slow_sag: tuple[float, float] | None = None  # resistance of the battery that acts late [ohm], time [s]
+    holding: float = 0.0  # share of the supply per angle from where a motor was stopped [1/rad]
+    latch: tuple[float, float] | None = (
+        None  # period of looking for commands [s], share of one gone at the start
+    )
+    second_spot: tuple[float, float, float] | None = None  # share of the light, ahead, left of the first [m]
+    auto_gain: tuple[float, float] | None = None  # exponent of the mean reading, time of the mean [s]
+    keystone: tuple[float, float] = (0.0, 0.0)  # how the camera's scale falls along x and y [1/m]
+    frame_rate: float = 0.0  # frames come faster than they are counted for by this share
+    grooves: tuple[float, float] | None = None  # drag on the caster across them [N], their heading [rad]
+
     # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
     inductance_scale: float = 1.0
     presliding_scale: float = 1.0  # of the gear's deflection before it slides

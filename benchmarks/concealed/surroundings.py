@@ -40,12 +40,16 @@ class Surroundings:
         self._scratch = np.zeros(6)
         drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
         hauled = concealed.trailer or concealed.twist
-        self._pushed = bool(concealed.tether or concealed.magnet or concealed.gusts or drags or hauled)
-        self._braked = bool(concealed.rolling_resistance or concealed.strip)
+        dragged = concealed.hair or concealed.grooves
+        self._pushed = bool(
+            concealed.tether or concealed.magnet or concealed.gusts or drags or hauled or dragged
+        )
+        self._braked = bool(concealed.rolling_resistance or concealed.strip or concealed.frame_rub)
         self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
         self.idle = not (self._pushed or self._gripped or concealed.waves or self._braked)
         self._rolled, self._castor = 0.0, math.nan  # way of the wheels [m], heading of a castor wheel [rad]
         self._turned = 0.0  # since the recording began [rad]
+        self._wound = 0.0  # way of hair round the caster [m]
         self._weight: tuple[float, float] | None = None  # place of a weight on a string [m]
         shafts = [model.joint(side) for side in ("left", "right")]
         self._angle_at = [int(shaft.qposadr[0]) for shaft in shafts]
@@ -82,6 +86,9 @@ class Surroundings:
             if self._hidden.trailer is not None:
                 haul_x, haul_y, hauling = self._haul(x, y, heading)
                 drag_x, drag_y, turning = drag_x + haul_x, drag_y + haul_y, turning + hauling
+            if self._hidden.hair is not None or self._hidden.grooves is not None:
+                rub_x, rub_y, rubbing = self._rub_caster(heading, state.qvel)
+                drag_x, drag_y, turning = drag_x + rub_x, drag_y + rub_y, turning + rubbing
             state.xfrc_applied[self._chassis] = [force_x + drag_x, force_y + drag_y, 0.0, 0.0, 0.0, turning]
         if self._braked:
             self._resist(state)
@@ -145,6 +152,23 @@ class Surroundings:
             turning += arm * side * math.cos(self._castor - heading)
         return force_x, force_y, turning
 
+    def _rub_caster(self, heading: float, velocity: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+        """Force [N] and torque [N m] of hair round the caster's ball and of grooves that it runs in."""
+        hidden, force_x, force_y = self._hidden, 0.0, 0.0
+        cos, sin, back = math.cos(heading), math.sin(heading), self._hidden.base.caster_ahead
+        vx, vy = velocity[0] - back * sin * velocity[5], velocity[1] + back * cos * velocity[5]
+        if hidden.hair is not None:
+            most, way = hidden.hair
+            self._wound = min(max(self._wound + TICK_S * (cos * vx + sin * vy), 0.0), way)
+            speed = max(math.hypot(vx, vy), 1e-9)
+            drag = most * self._wound / way * math.tanh(speed / _DRAG_BLEND) / speed
+            force_x, force_y = -drag * vx, -drag * vy
+        if hidden.grooves is not None:
+            most, along = hidden.grooves
+            held = most * math.tanh((math.cos(along) * vy - math.sin(along) * vx) / _DRAG_BLEND)
+            force_x, force_y = force_x + held * math.sin(along), force_y - held * math.cos(along)
+        return force_x, force_y, (back - hidden.com_ahead) * (cos * force_y - sin * force_x)
+
     def _haul(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
         """Force [N] and torque [N m] of a weight that a string drags behind the caster; none while it is slack."""
         most, length = self._hidden.trailer or (0.0, 1.0)
@@ -185,13 +209,14 @@ class Surroundings:
         return float(force_x), float(force_y)
 
     def _resist(self, state: mujoco.MjData) -> None:
-        """Torque against each wheel's turning: coefficient x load x radius, and what a sticky strip holds it with."""
+        """Torque against each wheel's turning: coefficient x load x radius, and what a strip or the frame holds."""
         loads = self._loads(state)
-        sticking = self._sticking(state)
+        sticking, rubbing = self._sticking(state), self._rubbing(state)
         axle = state.xmat[self._chassis].reshape(3, 3)[:, 1]
         turning = state.qvel[[6, -1]] if state.qvel.size == 8 else state.qvel[[6, 8]] + state.qvel[[7, 9]]
         for side, body in enumerate(self._wheels):
             brake = self._hidden.rolling_resistance * loads[side] * self._radii[side] + sticking[side]
+            brake += rubbing[side]
             state.xfrc_applied[body, 3:] = -brake * math.tanh(turning[side] / _ROLLING_BLEND) * axle
 
     def _sticking(self, state: mujoco.MjData) -> tuple[float, float]:
@@ -207,6 +232,16 @@ class Surroundings:
             across = math.cos(angle) * off_x + math.sin(angle) * off_y
             held.append(most if abs(across) < width / 2.0 else 0.0)
         return held[0], held[1]
+
+    def _rubbing(self, state: mujoco.MjData) -> list[float]:
+        """Give the torque with which the frame holds the wheel that a turn presses on it [N m]."""
+        held = [0.0, 0.0]
+        if self._hidden.frame_rub is not None:
+            rub, way, side = self._hidden.frame_rub
+            heading, velocity = _heading(state), state.qvel
+            ahead = math.cos(heading) * velocity[0] + math.sin(heading) * velocity[1]
+            held[side] = rub * max(way * float(ahead * velocity[5]), 0.0)
+        return held
 
     def _loads(self, state: mujoco.MjData) -> list[float]:
         """Read the normal force under the left and the right wheel in the step before [N]."""

@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Picture
 
-from benchmarks.concealed.cases import ALL_OUTSIDE
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.judging import Judged
+from benchmarks.concealed.kinds import ALL_OUTSIDE
 from benchmarks.concealed.score import Figure, figures, loudness
 
 NOTHING, UNEXPLAINED = "(nothing)", "(unexplained)"

@@ -25,13 +25,13 @@ from benchmarks.concealed.drive_train import DriveTrain
 from benchmarks.concealed.exam import Terms, agreed
 from benchmarks.concealed.history import replayed
 from benchmarks.concealed.judging import judge
-from benchmarks.concealed.outside import OUTSIDE
+from benchmarks.concealed.kinds.outside import OUTSIDE
+from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.plan import Counts, draw_all, plan
 from benchmarks.concealed.results import write_results
 from benchmarks.concealed.robot import Concealed
 from benchmarks.concealed.runner import run_all
 from benchmarks.concealed.score import figures, score
-from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth
 from gecar.parallel import run_parallel

@@ -19,13 +19,13 @@ from benchmarks.concealed import cases
 from benchmarks.concealed.__main__ import main
 from benchmarks.concealed.cases import Manner, draw_case, unlike_neutral
 from benchmarks.concealed.colour_sensor import ColourSensor
-from benchmarks.concealed.final_kinds import FINAL
 from benchmarks.concealed.history import History
-from benchmarks.concealed.outside import OUTSIDE
+from benchmarks.concealed.kinds.final import FINAL
+from benchmarks.concealed.kinds.outside import OUTSIDE
+from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.plan import Counts, outside_kinds, plan
 from benchmarks.concealed.recording import channels
 from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
-from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.worlds import WORLDS, holds, truth
 
@@ -110,17 +110,21 @@ def test_what_is_drawn_by_chance_differs_from_run_to_run():
 
 def test_the_last_kinds_are_drawn_alone_or_not_at_all():
     manner = Manner("continuous", background=True)
-    assert outside_kinds(manner, last=False, final=True) == list(FINAL)
-    assert not set(FINAL) & {*outside_kinds(manner, last=True), *OUTSIDE, *SEALED}
+    assert outside_kinds(manner, "final") == list(FINAL)
+    assert not set(FINAL) & {*outside_kinds(manner, "last"), *OUTSIDE, *SEALED}
 
 
 @pytest.mark.parametrize(
-    ("background", "last", "digest"),
-    [(False, False, "e86938185368c8fd"), (True, False, "5843117a0cf3199c"), (True, True, "21f99483abb5d24f")],
+    ("background", "kinds", "digest"),
+    [
+        (False, "met", "e86938185368c8fd"),
+        (True, "met", "5843117a0cf3199c"),
+        (True, "last", "21f99483abb5d24f"),
+    ],
 )
-def test_an_old_seed_plans_what_it_planned_before(background, last, digest):
+def test_an_old_seed_plans_what_it_planned_before(background, kinds, digest):
     counts = {"mujoco": Counts(2, 5, 3, 20), "continuous": Counts(1, 5, 3, 30, 2, 10)}
-    planned = plan(7, counts, background=background, last=last)
+    planned = plan(7, counts, background=background, kinds=kinds)
     told = repr([(case.name, case.kind, case.effects, case.seed) for case in planned])
     assert hashlib.sha256(told.encode()).hexdigest()[:16] == digest
 
@@ -129,7 +133,7 @@ def test_the_command_plans_cases_of_the_last_kinds(monkeypatch, tmp_path):
     drawn = []
     monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))
     world = ["--world", f"continuous:outside={len(FINAL)},mixed=2"]
-    assert main(["plan", "--seed", "3", "--final", *world, "--out", str(tmp_path)]) == 0
+    assert main(["plan", "--seed", "3", "--kinds", "final", *world, "--out", str(tmp_path)]) == 0
     outside = [case.effects[-1] for case in drawn]
     assert set(outside) == set(FINAL)
     assert len(outside) == len(FINAL) + 2

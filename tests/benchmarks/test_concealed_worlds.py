@@ -18,11 +18,11 @@ from benchmarks.concealed.cases import Manner, draw_case
 from benchmarks.concealed.effects import EFFECTS
 from benchmarks.concealed.history import replayed
 from benchmarks.concealed.judging import judge
+from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.plan import Counts, outside_kinds, plan
 from benchmarks.concealed.recording import CHANNELS
 from benchmarks.concealed.rehearsal import tuned
 from benchmarks.concealed.robot import LARGE, NEUTRAL, Concealed
-from benchmarks.concealed.sealed_kinds import SEALED
 from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.sizes import is_material, size
 from benchmarks.concealed.worlds import truth
@@ -151,7 +151,7 @@ def test_worlds_refuse_what_they_have_no_law_for():
         truth("bullet", Concealed(oval=(0.002, 0.0, 0.0)))
     with pytest.raises(ValueError, match="loosening"):
         truth("mujoco", Concealed(loosening=(0.01, 0)))
-    assert "oval_wheels" not in outside_kinds(Manner("bullet", background=True), last=True)
+    assert "oval_wheels" not in outside_kinds(Manner("bullet", background=True), "last")
 
 
 def test_half_of_the_new_kinds_wait_for_the_last_examination():
@@ -159,8 +159,8 @@ def test_half_of_the_new_kinds_wait_for_the_last_examination():
     assert len(last) >= 6
     assert len(SEALED) - len(last) >= 6
     manner = Manner("continuous", background=True)
-    assert not last & set(outside_kinds(manner, last=False))
-    assert last <= set(outside_kinds(manner, last=True))
+    assert not last & set(outside_kinds(manner))
+    assert last <= set(outside_kinds(manner, "last"))
 
 
 def test_plan_of_several_worlds_has_counts_for_each():

@@ -109,6 +109,7 @@ class _Robot:
         self._lean(*concealed.tilt)
         still = (concealed.air_drag, concealed.yaw_pull) == (0.0, 0.0)
         pulls = (concealed.tether, concealed.magnet, concealed.pile, concealed.swivel, concealed.trailer)
+        pulls += (concealed.hair, concealed.grooves)
         self._pushed = (
             not still
             or concealed.twist > 0.0
@@ -150,6 +151,11 @@ class _Robot:
         shares, tick_s = np.array(duties), TICK_S / _STEPS / _DRIVE_STEPS
         self._surround(n, x, y)
         brakes, push = self._brakes(n, x, y, turn), (0.0, 0.0, 0.0)
+        if n.frame_rub > 0.0:
+            ahead = math.cos(turn) * velocity[0] + math.sin(turn) * velocity[1]
+            for side in range(2):
+                held = chassis.rubbing(n, side, ahead, rates[2])
+                brakes[side] += held * math.tanh(self._speeds[side] / _ROLLING_BLEND)
         if self._pushed:
             # The stated velocity is that of the chassis' centre of mass.
             back = self._body.axle[0]

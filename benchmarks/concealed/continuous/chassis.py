@@ -15,9 +15,10 @@ from benchmarks.concealed.robot import CASTER_RADIUS, GRAVITY, WHEEL_MASS
 # State: place and velocity of the centre of mass [m, m/s], heading and its rate [rad, rad/s], wheels' angles and speeds
 # [rad, rad/s], deflections of both treads and of the caster's contact, ahead and left [m], of the tyres' flexing
 # [rad], force of the floor in the step before, ahead and left [N], way rolled [m], heading of a castor wheel [rad],
-# for how long a contact has been lifted [s], angle turned since the start [rad], place of a weight on a string [m].
+# for how long a contact has been lifted [s], angle turned since the start [rad], place of a weight on a string [m],
+# way of hair wound round the caster [m].
 X, Y, TURN, VX, VY, RATE, WHEEL, WHEEL_SPEED = 0, 1, 2, 3, 4, 5, 6, 8
-TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, SIZE = (
+TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, WOUND, SIZE = (
     10,
     14,
     16,
@@ -28,6 +29,7 @@ TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, SIZE = (
     23,
     24,
     26,
+    27,
 )
 
 # Brush tyre with a first-order relaxation of the contact (Pacejka, Tire and Vehicle Dynamics, 3rd ed., ch. 3 and 7).
@@ -126,6 +128,8 @@ def _step_body(
         flexed = _dahl(b, FLEX + side, b[WHEEL_SPEED + side], _FLEX_SLIDES, dt)
         brake = flexed * n.rolling * loads[side] * radius
         brake += flexed * sticking(n, side, axle_x, axle_y, b[TURN])
+        if n.frame_rub > 0.0:
+            brake += flexed * rubbing(n, side, ahead, b[RATE])
         # A wheel that lifts its axle as it turns is held back by its load.
         turning = torques[side] - radius * push_x - brake - loads[side] * rise
         b[WHEEL_SPEED + side] += dt * turning / inertia
@@ -190,6 +194,38 @@ def sticking(n: Numbers, side: int, x: float, y: float, turn: float) -> float:
     off_x, off_y = turned(0.0, n.half_track if side == 0 else -n.half_track, turn)
     across, _ = turned(x + off_x - n.strip_x, y + off_y - 0.6, -n.strip_angle)
     return n.strip if abs(across) < n.strip_width / 2.0 else 0.0
+
+
+@numba.njit(cache=True)
+def rubbing(n: Numbers, side: int, ahead: float, rate: float) -> float:
+    """Give the torque with which the frame holds a wheel that a turn presses on it [N m]."""
+    if n.frame_rub == 0.0 or n.frame_rub_side != side:
+        return 0.0
+    return n.frame_rub * max(n.frame_rub_way * ahead * rate, 0.0)
+
+
+@numba.njit(cache=True)
+def _drag_caster(
+    n: Numbers, b: npt.NDArray[np.float64], turn: float, vx: float, vy: float, rate: float, dt: float
+) -> tuple[float, float, float]:
+    """Give the drag of hair and grooves on the caster [N], and its torque about the centre of mass [N m]."""
+    off_x, off_y = turned(0.0, n.caster * rate, turn)
+    x, y = vx + off_x, vy + off_y
+    force_x, force_y = 0.0, 0.0
+    if n.hair > 0.0:
+        rolling, _ = turned(x, y, -turn)
+        b[WOUND] = min(max(b[WOUND] + dt * rolling, 0.0), n.hair_way)
+        speed = math.hypot(x, y)
+        # tanh(v / blend) / v, whose limit at rest is 1 / blend.
+        drag = math.tanh(speed / _DRAG_BLEND) / speed if speed > 1e-9 else 1.0 / _DRAG_BLEND
+        drag *= n.hair * b[WOUND] / n.hair_way
+        force_x, force_y = -drag * x, -drag * y
+    if n.grooves > 0.0:
+        _, across = turned(x, y, -n.grooves_way)
+        side_x, side_y = turned(0.0, -n.grooves * math.tanh(across / _DRAG_BLEND), n.grooves_way)
+        force_x, force_y = force_x + side_x, force_y + side_y
+    _, side = turned(force_x, force_y, -turn)
+    return force_x, force_y, (n.caster - n.com_ahead) * side
 
 
 @numba.njit(cache=True)
@@ -349,8 +385,8 @@ def pushes(
     Parameters
     ----------
     n, b
-        The robot and its state, of which only a castor wheel's heading, the angle turned and a weight on a string
-        are used.
+        The robot and its state, of which only a castor wheel's heading, the angle turned, a weight on a string and
+        hair round the caster are used.
     x, y, turn
         Pose of the axle's centre [m, m, rad].
     vx, vy, rate
@@ -398,6 +434,9 @@ def pushes(
     if n.trailer > 0.0:
         haul_x, haul_y, hauling = _haul(n, b, x, y, turn, dt)
         force_x, force_y, torque = force_x + haul_x, force_y + haul_y, torque + hauling
+    if n.hair > 0.0 or n.grooves > 0.0:
+        drag_x, drag_y, dragging = _drag_caster(n, b, turn, vx, vy, rate, dt)
+        force_x, force_y, torque = force_x + drag_x, force_y + drag_y, torque + dragging
     return force_x, force_y, torque
 
 

@@ -11,8 +11,11 @@ import numpy.typing as npt
 from benchmarks.concealed.continuous.numbers import Numbers
 
 # State: currents [A], shaft speeds [rad/s], shaft angles [rad], bristle deflections [rad], left and right; then the
-# voltage of the battery's slow branch [V], the voltage at its terminals [V] and what the firmware adds to both duties.
-CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT, SIZE = 0, 2, 4, 6, 8, 9, 10, 12
+# voltage of the battery's slow branch [V], the voltage at its terminals [V] and what the firmware adds to both duties;
+# then angles at which motors were stopped [rad], share of a grease's stiffness that is left, less one, voltage of a
+# worn battery's slow part [V].
+CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT = 0, 2, 4, 6, 8, 9, 10
+HELD, GREASE, SAGGED, SIZE = 12, 14, 15, 16
 
 # Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
 GEAR_STIFFNESS = 40.0  # N m / rad
@@ -29,6 +32,8 @@ _LIMITER = 20.0  # V s / rad
 _BAND_SLIPS = 10.0  # rad
 _DRAG_BLEND = 0.2  # rad / s
 _RUB_BLEND = 0.5  # rad / s
+_GREASE_BLEND = 0.3  # rad / s
+_MOST_HELD = 0.8  # share of the supply, the duty cap
 
 
 @numba.njit(cache=True)
@@ -62,8 +67,13 @@ def step_drive(
         Receives the gears' torques on the wheels (2,) [N m].
     """
     left, right = _keep(n, d, 0, duties[0], dt), _keep(n, d, 1, duties[1], dt)
+    if n.holding > 0.0:
+        left, right = _hold(n, d, 0, left), _hold(n, d, 1, right)
     drawn = left * d[CURRENT] + right * d[CURRENT + 1]
     source = n.supply - n.drain * time_s
+    if n.sag > 0.0:
+        source -= d[SAGGED]
+        d[SAGGED] += dt / n.sag_time * (n.sag * drawn - d[SAGGED])
     terminal = source - (1.0 - _SLOW_SHARE) * n.inner_resistance * drawn - d[SLOW]
     d[SLOW] += dt / _SLOW_TIME * (_SLOW_SHARE * n.inner_resistance * drawn - d[SLOW])
     d[TERMINAL] = terminal
@@ -74,6 +84,8 @@ def step_drive(
         torque += _cogs(n, side, speed, angle)
         torque -= _friction(n, d, side, speed, dt) + n.viscous * speed
         torque -= rub if side == 0 else -rub
+        if n.grease > 0.0 and n.grease_side == side:
+            torque -= _shear(n, d, speed, dt)
         play = n.play + (n.loosening_left if side == 0 else n.loosening_right) * time_s
         gear = _gear(play / 2.0, angle - wheel_angles[side], speed - wheel_speeds[side])
         d[SPEED + side] += dt * (torque - gear) / n.shaft_inertia
@@ -124,6 +136,23 @@ def _keep(n: Numbers, d: npt.NDArray[np.float64], side: int, duty: float, dt: fl
 
 
 @numba.njit(cache=True)
+def _hold(n: Numbers, d: npt.NDArray[np.float64], side: int, duty: float) -> float:
+    """Remember where a motor is while it is driven; give the duty that brings it back there when it is not."""
+    if duty != 0.0:
+        d[HELD + side] = d[ANGLE + side]
+        return duty
+    return min(max(n.holding * (d[HELD + side] - d[ANGLE + side]), -_MOST_HELD), _MOST_HELD)
+
+
+@numba.njit(cache=True)
+def _shear(n: Numbers, d: npt.NDArray[np.float64], speed: float, dt: float) -> float:
+    """Advance the structure of a gear's grease, which turning breaks down and time builds up; give its drag [N m]."""
+    structure = 1.0 + d[GREASE]
+    d[GREASE] += dt * ((1.0 - structure) / n.grease_rest - structure * abs(speed) / n.grease_shear)
+    return n.grease * structure * math.tanh(speed / _GREASE_BLEND)
+
+
+@numba.njit(cache=True)
 def _motor(
     n: Numbers,
     d: npt.NDArray[np.float64],
@@ -149,7 +178,10 @@ def _motor(
     d[CURRENT + side] = current
     if duty == 0.0:
         current *= 1.0 - n.coasting
-    return n.torque_constant * current
+    torque = n.torque_constant * current
+    if n.gear_loss > 0.0 and n.gear_loss_side == side:
+        torque -= n.gear_loss * abs(torque) * math.tanh(speed / _DRAG_BLEND)
+    return torque
 
 
 @numba.njit(cache=True)

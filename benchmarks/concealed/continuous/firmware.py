@@ -24,6 +24,7 @@ class Firmware:
         self._issued: list[tuple[float, float]] = []
         self._late = round(concealed.actuation_delay / TICK_S)
         self._now = [0.0, 0.0]
+        self._polls, self._polled = 0, (0.0, 0.0)  # how often commands were looked for, and those seen last
         # By motor: the way it was driven last, and when that ended.
         self._last: list[tuple[float, float]] = [(0.0, -math.inf)] * 2
         self._known: dict[tuple[float, float], tuple[float, float]] = {}
@@ -45,7 +46,8 @@ class Firmware:
         """
         hidden = self._hidden
         lost = hidden.dropouts and any(0.0 <= time_s - start < length for start, length in hidden.dropouts)
-        self._issued.append((0.0, 0.0) if lost else command_pct)
+        heard = (0.0, 0.0) if lost else command_pct
+        self._issued.append(heard if hidden.latch is None else self._latched(heard, time_s, *hidden.latch))
         acting = self._issued[-1 - self._late] if self._late < len(self._issued) else (0.0, 0.0)
         most = hidden.command_slew * TICK_S
         if most < math.inf:
@@ -64,6 +66,14 @@ class Firmware:
         gains = [1.0, 1.0]
         gains[side] += float(np.interp(time_s, KNOT_S * np.arange(len(knots)), knots))
         return shares[0] * gains[0], shares[1] * gains[1]
+
+    def _latched(
+        self, heard: tuple[float, float], time_s: float, period: float, gone: float
+    ) -> tuple[float, float]:
+        """Give the command that was there when the firmware last looked: at the end of each period."""
+        if time_s >= (self._polls + 1 - gone) * period:
+            self._polls, self._polled = math.floor(time_s / period + gone), heard
+        return self._polled
 
     def _rested(self, side: int, duty_pct: float, time_s: float) -> float:
         """Let a motor turn round only when it has rested."""

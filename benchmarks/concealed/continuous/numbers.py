@@ -115,6 +115,22 @@ class Numbers(NamedTuple):
     keeper: float
     keeper_most: float
     nominal_supply: float
+    gear_loss: float
+    gear_loss_side: float
+    grease: float
+    grease_rest: float
+    grease_shear: float
+    grease_side: float
+    frame_rub: float
+    frame_rub_way: float
+    frame_rub_side: float
+    hair: float
+    hair_way: float
+    sag: float
+    sag_time: float
+    holding: float
+    grooves: float
+    grooves_way: float
 
 
 def numbers(concealed: Concealed) -> Numbers:
@@ -148,6 +164,9 @@ def numbers(concealed: Concealed) -> Numbers:
     pile, swivel = concealed.pile or (0.0, 0.0), concealed.swivel or (0.0, 1.0)
     strip, toe = concealed.strip or (0.0, 0.0, 0.0, 0.0), concealed.toe or (0.0, 0)
     trailer, keeper = concealed.trailer or (0.0, 1.0), concealed.keeper or (0.0, 0.0)
+    gear_loss, grease = concealed.gear_loss or (0.0, 0), concealed.grease or (0.0, 1.0, 1.0, 0)
+    frame_rub, hair = concealed.frame_rub or (0.0, 1.0, 0), concealed.hair or (0.0, 1.0)
+    sag, grooves = concealed.slow_sag or (0.0, 1.0), concealed.grooves or (0.0, 0.0)
     fields = {
         "mass": base.mass,
         "yaw_inertia": base.yaw_inertia,
@@ -245,6 +264,22 @@ def numbers(concealed: Concealed) -> Numbers:
         "keeper": keeper[0],
         "keeper_most": keeper[1],
         "nominal_supply": base.supply,
+        "gear_loss": gear_loss[0],
+        "gear_loss_side": gear_loss[1],
+        "grease": grease[0],
+        "grease_rest": grease[1],
+        "grease_shear": grease[2],
+        "grease_side": grease[3],
+        "frame_rub": frame_rub[0],
+        "frame_rub_way": frame_rub[1],
+        "frame_rub_side": frame_rub[2],
+        "hair": hair[0],
+        "hair_way": hair[1],
+        "sag": sag[0],
+        "sag_time": sag[1],
+        "holding": concealed.holding,
+        "grooves": grooves[0],
+        "grooves_way": grooves[1],
     }
     return Numbers(**{name: float(number) for name, number in fields.items()})
 

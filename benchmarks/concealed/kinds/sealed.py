@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from benchmarks.concealed.effects import Rng, strength
-from benchmarks.concealed.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
+from benchmarks.concealed.kinds.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
 from benchmarks.concealed.robot import NEUTRAL
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.concealed.effects import Rng, strength
-from benchmarks.concealed.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
+from benchmarks.concealed.kinds.outside import Drawn, Outside, same_in_all, some_phase, some_side, some_sign
 from benchmarks.concealed.robot import NEUTRAL
 
 _KNOTS = 32  # of a drive that wanders: 16 s, longer than a recording
