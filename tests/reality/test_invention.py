@@ -345,9 +345,9 @@ def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkey
 
 def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(monkeypatch):
     monkeypatch.setattr(discovery, "_is_left", lambda _: True)
-    assert with_oval_wheels(0.008).verdict == "nothing"
+    assert with_oval_wheels(0.004).verdict == "nothing"
     monkeypatch.setattr(discovery, "_is_material", lambda _: True)
-    assert with_oval_wheels(0.008).verdict == "invented"
+    assert with_oval_wheels(0.004).verdict == "invented"
 
 
 @pytest.mark.parametrize("before", ["nothing", "refused", "another"])

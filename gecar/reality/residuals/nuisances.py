@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -22,14 +23,52 @@ class SensorPath:
         How late the camera's clock was taken to be when the path was made [s].
     blur_m
         Standard deviation of its positions [m]; an uncertain path sees edges blurred on average.
-    reading_sd
-        Standard deviation of each reading, the path's uncertainty included, shape (rows,) [%]; nan: not compared.
+    own_sd
+        Standard deviation of each reading where the path is known, shape (rows,) [%]; nan: not compared.
+    slopes
+        What one standard deviation of the path's x, y and heading changes in each reading, shape (rows, 3) [%].
+    block
+        How many rows a path's error lasts.
     """
 
     poses: Array
     late_s: float
     blur_m: float
-    reading_sd: Array
+    own_sd: Array = field(default_factory=lambda: np.zeros(0))
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    block: int = 1
+
+    @cached_property
+    def reading_sd(self) -> Array:
+        """Standard deviation of each reading, the path's uncertainty included, shape (rows,) [%]; nan: not compared."""
+        return np.asarray(np.sqrt(self.own_sd**2 + np.sum(self.slopes**2, axis=1)))
+
+    def whitened(self, errors: Array) -> Array:
+        """Return errors of readings [%], shape (m, rows), in units of their noise, which the path's error shares out.
+
+        Over a block of rows the path is off by one place: an edge comes early or late, and is no wider for that.
+        Covariance 1 + G G', as of small changes in `gecar.reality.fitting.discrepancy`, block by block.
+        """
+        basis, shrinking = self._decomposed
+        scaled = errors / self.own_sd
+        blocks = self._in_blocks(np.nan_to_num(scaled).T).transpose(0, 2, 1)
+        inside = (blocks @ basis) * shrinking[:, None, :]
+        explained = (inside @ basis.transpose(0, 2, 1)).transpose(0, 2, 1)
+        explained = explained.reshape(len(basis) * self.block, len(errors))
+        return np.asarray(scaled - explained[: errors.shape[1]].T)
+
+    @cached_property
+    def _decomposed(self) -> tuple[Array, Array]:
+        """Singular vectors of each block's slopes, shape (blocks, rows, 3), and by how much each is shrunk."""
+        slopes = np.nan_to_num(self.slopes / self.own_sd[:, None])
+        basis, spread, _ = np.linalg.svd(self._in_blocks(slopes), full_matrices=False)
+        return basis, 1.0 - 1.0 / np.sqrt(1.0 + spread**2)
+
+    def _in_blocks(self, rows: Array) -> Array:
+        """Return values by row, shape (rows, k), as (blocks, rows of a block, k); the last is filled up with zeros."""
+        count, columns = -(-len(rows) // self.block), rows.shape[1]
+        filled = np.pad(rows, ((0, count * self.block - len(rows)), (0, 0)))
+        return filled.reshape(count, self.block, columns)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ Physics = npt.NDArray[Any]
 NO_SHIFT = np.zeros(3)
 SMOOTHED_BLOCKS = 2.8  # blocks a path is smoothed over: 3.5 x 0.12 s of 0.15 s each
 DISC_SPREAD = 4.0  # a disc's diameter over its standard deviation along an axis
+PATH_LASTS_S = 0.3  # about how long a path is off by one place: camera poses are smoothed over 0.4 s
+QUICK = 0.25  # share of a path's standard deviation that changes from row to row
 OFF_COURSE_M = -10.0  # there is bare floor
 # Standard deviations of a path by dead reckoning once its start is refined [m, m, rad].
 ODOMETRY_SD = PATH_CAUTION * np.array([0.00025, 0.00025, 0.001])
@@ -117,10 +119,13 @@ class RecordingResiduals:
             sd = self.noise.path_sd * np.sqrt(inflation)
             smeared = self.noise.path_sd * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
         blur = float(np.hypot(smeared[0], float(physics["sensor_ahead"][0]) * smeared[2])) / PATH_CAUTION
-        unknown = SensorPath(poses, late, blur, np.zeros(0))
+        unknown = SensorPath(poses, late, blur)
         found = self.with_nuisances(replace(self.nuisances, path=unknown))
-        reading_sd = found.predicted_reading_sd(physics, sd)
-        return self.with_nuisances(replace(self.nuisances, path=replace(unknown, reading_sd=reading_sd)))
+        slopes = found.reading_slopes(physics, sd)
+        quick = self.noise.reflection_sd**2 + QUICK**2 * np.sum(slopes**2, axis=1)
+        block = max(round(PATH_LASTS_S / float(np.median(np.diff(self.replayer.t)))), 1)
+        path = replace(unknown, own_sd=np.sqrt(quick), slopes=slopes, block=block)
+        return self.with_nuisances(replace(self.nuisances, path=path))
 
     def readings(self, physics: Physics, shift: Array = NO_SHIFT) -> Array:
         """Return the predicted reflection at every row [%]; nan where there is nothing to compare.
@@ -151,7 +156,7 @@ class RecordingResiduals:
         readings = np.zeros((len(physics), len(self.recording.t_s)))
         for k in range(len(physics)):
             readings[k] = self.readings(physics[k : k + 1])
-        return (self.recording.reflection_pct - readings) / self.nuisances.path.reading_sd
+        return self.nuisances.path.whitened(self.recording.reflection_pct - readings)
 
     def motion_index(self, number: int) -> tuple[ResidualIndex, Mask]:
         """Return where residuals of motion come from, as that recording of a case, and which of them there are."""
@@ -164,7 +169,7 @@ class RecordingResiduals:
     def sensor_index(self, number: int) -> tuple[ResidualIndex, Mask]:
         """Return where residuals of the colour sensor come from, and which of them there are."""
         assert self.nuisances.path is not None
-        t, sd = self.replayer.t, self.nuisances.path.reading_sd
+        t, sd = self.replayer.t, self.nuisances.path.own_sd
         there = ~np.isnan(self.recording.reflection_pct) & ~np.isnan(sd)
         return _index(number, np.full(len(t), REFLECTION), t), there
 
@@ -179,10 +184,15 @@ class RecordingResiduals:
 
     def predicted_reading_sd(self, physics: Physics, path_sd: Array) -> Array:
         """Return each reading's standard deviation [%], from the sensor's noise and a path's uncertainty (3,)."""
-        variance = np.full(len(self.replayer.t), self.noise.reflection_sd**2)
-        for shift in np.diag(path_sd):
-            variance += (0.5 * (self.readings(physics, shift) - self.readings(physics, -shift))) ** 2
-        return np.sqrt(variance)
+        variance = np.sum(self.reading_slopes(physics, path_sd) ** 2, axis=1)
+        return np.sqrt(self.noise.reflection_sd**2 + variance)
+
+    def reading_slopes(self, physics: Physics, path_sd: Array) -> Array:
+        """Return what a path's uncertainty (3,) in x, y and heading changes in each reading [%], shape (rows, 3)."""
+        shifts = np.diag(path_sd)
+        return np.stack(
+            [0.5 * (self.readings(physics, each) - self.readings(physics, -each)) for each in shifts], axis=1
+        )
 
     def _along(
         self, path: Array, physics: Physics, shift: Array = NO_SHIFT, late: float = 0.0, every: int = 1

@@ -28,7 +28,7 @@ from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
-RIPPLE = "torque_ripple"
+RIPPLE, SPOT_SIZE = "torque_ripple", "spot_size"
 LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
 PROBE = 0.4  # of a size worth a name: step of finite differences by small changes
 REFINEMENTS = 2  # of small changes, by derivatives taken anew
@@ -363,9 +363,10 @@ def problem_of(
     estimator = Estimator(residuals, robot, np.random.default_rng(seed))
     beside = held.recordings if held else ()
     sizes = Sizes(residuals.recordings, residuals.sensor, beside)
-    # What a sensor reads along a path tells little below what is known of the path.
-    small = not (estimator.on_bench or residuals.sensor)
-    worth = worth_a_name(sizes, material, robot, catalogue) if small else {}
+    small = () if estimator.on_bench else catalogue
+    if residuals.sensor:  # an edge is as wide wherever the path lies; where it lies a path tells to 3 mm
+        small = [effect for effect in catalogue if effect == SPOT_SIZE]
+    worth = worth_a_name(sizes, material, robot, small)
     return Problem(estimator, tuple(catalogue), material, sizes, estimator.known(), tell, worth=worth)
 
 

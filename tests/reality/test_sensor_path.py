@@ -1,0 +1,57 @@
+"""The path that carries a colour sensor is off by about one place while the sensor crosses an edge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gecar.reality.residuals.nuisances import SensorPath
+
+ROWS, BLOCK = 95, 30  # the last block is not full
+RNG = np.random.default_rng(0)
+SLOPES = RNG.normal(0.0, 5.0, (ROWS, 3))
+PATH = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, np.full(ROWS, 2.0), SLOPES, BLOCK)
+
+
+def edges(width: float, at: float = 0.0) -> np.ndarray:
+    """Return readings across one edge in the middle of each block [%], at 1 mm a row."""
+    way = np.arange(ROWS) % BLOCK - 0.5 * BLOCK - at
+    return 50.0 * (1.0 + np.tanh(way / width))
+
+
+def left_of(errors: np.ndarray, path: SensorPath) -> float:
+    """Return which share of the squared errors is left by what the path may be off by."""
+    return float(np.sum(path.whitened(errors[None]) ** 2) / np.sum((errors / path.own_sd) ** 2))
+
+
+def test_errors_are_whitened_by_the_root_of_each_blocks_covariance() -> None:
+    errors = RNG.normal(size=(4, ROWS))
+    found = PATH.whitened(errors)
+    for first in range(0, ROWS, BLOCK):
+        own = slice(first, first + BLOCK)
+        covariance = 4.0 * np.eye(len(SLOPES[own])) + SLOPES[own] @ SLOPES[own].T
+        squares, basis = np.linalg.eigh(covariance)
+        root = basis @ np.diag(squares**-0.5) @ basis.T
+        assert found[:, own] == pytest.approx(errors[:, own] @ root, abs=1e-9)
+    assert PATH.whitened(errors[:0]).shape == (0, ROWS)
+
+
+def test_a_reading_that_is_not_there_says_nothing_of_others() -> None:
+    errors = RNG.normal(size=(1, ROWS))
+    own_sd, slopes = np.full(ROWS, 2.0), SLOPES.copy()
+    own_sd[5], slopes[5], errors[0, 5] = np.nan, np.nan, np.nan
+    beside = SensorPath(PATH.poses, 0.0, 0.001, own_sd, slopes, BLOCK).whitened(errors)
+    there = np.arange(ROWS) != 5
+    assert np.isfinite(beside[0, there]).all()
+    assert np.isnan(beside[0, 5])
+
+
+def test_an_edge_that_comes_early_is_the_paths_error_and_one_that_is_wider_is_not() -> None:
+    # A path known to 3 mm: per reading, both would drown in it.
+    slopes = np.zeros((ROWS, 3))
+    slopes[:, 0] = 15.0 * (edges(4.0, at=0.1) - edges(4.0, at=-0.1))
+    path = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, np.full(ROWS, 1.0), slopes, BLOCK)
+    early, wider = (each - edges(4.0) for each in (edges(4.0, at=-0.3), edges(5.0)))
+    assert left_of(early, path) < 0.01
+    assert left_of(wider, path) > 0.5
+    assert np.sum((wider / path.reading_sd) ** 2) < 0.05 * np.sum(wider**2)
