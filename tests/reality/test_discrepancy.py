@@ -166,6 +166,7 @@ def test_what_dims_readings_shows_on_even_floor_where_a_line_hides_it(even_rows:
     dimmed = SimpleNamespace(
         recording=SimpleNamespace(reflection_pct=np.full(1000, 80.0 - np.hypot(10.0, noise))),
         noise=SimpleNamespace(reflection_sd=noise),
+        nuisances=SimpleNamespace(start=np.zeros(3)),
         readings=lambda _: np.full(1000, 80.0),
         predicted_reading_sd=lambda *_: predicted_sd,
     )

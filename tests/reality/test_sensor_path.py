@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.concealing import EV3
+from test_location import seen_on_the_course
 
+from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.residuals.nuisances import SensorPath
+from gecar.reality.residuals.of_recording import residuals_of
+from gecar.reality.residuals.parting import PATH_KNOWN
+from gecar.reality.residuals.registration import beyond_any_path
+from gecar.world.course.course import load_course
 
 ROWS, BLOCK = 95, 30  # the last block is not full
 RNG = np.random.default_rng(0)
@@ -55,3 +64,22 @@ def test_an_edge_that_comes_early_is_the_paths_error_and_one_that_is_wider_is_no
     assert left_of(early, path) < 0.01
     assert left_of(wider, path) > 0.5
     assert np.sum((wider / path.reading_sd) ** 2) < 0.05 * np.sum(wider**2)
+
+
+@pytest.mark.parametrize(
+    ("off_m", "waxing", "unmoved", "least", "most"),
+    [(0.0, 0.0, 0.6, 0.0, 0.3), (0.002, 0.0, 2.4, 0.0, 0.3), (0.002, 0.08, 6.1, 5.0, 6.0)],
+    ids=["as measured", "path 2 mm off", "and the light flickers"],
+)
+def test_what_readings_leave_however_the_path_is_shifted(
+    off_m: float, waxing: float, unmoved: float, least: float, most: float
+) -> None:
+    run = seen_on_the_course(4, EV3)
+    light = 1.0 + waxing * np.sin(2.0 * np.pi * 1.1 * run.t_s)
+    run = replace(run, reflection_pct=np.round(run.reflection_pct * light), y_m=run.y_m + off_m)
+    beside = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, load_course("paper"))
+    along = beside.with_path(EV3.physics, np.ones(3))
+    left = np.sqrt(max(float(np.nanmean(beyond_any_path(along, EV3.physics, PATH_KNOWN))), 0.0))
+    assert least <= left <= most
+    errors = run.reflection_pct - along.readings(EV3.physics)
+    assert np.sqrt(np.nanmean(errors**2)) == pytest.approx(unmoved, abs=0.1)

@@ -119,13 +119,28 @@ class RecordingResiduals:
             sd = self.noise.path_sd * np.sqrt(inflation)
             smeared = self.noise.path_sd * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
         blur = float(np.hypot(smeared[0], float(physics["sensor_ahead"][0]) * smeared[2])) / PATH_CAUTION
-        unknown = SensorPath(poses, late, blur)
-        found = self.with_nuisances(replace(self.nuisances, path=unknown))
-        slopes = found.reading_slopes(physics, sd)
-        quick = self.noise.reflection_sd**2 + QUICK**2 * np.sum(slopes**2, axis=1)
         block = max(round(PATH_LASTS_S / float(np.median(np.diff(self.replayer.t)))), 1)
-        path = replace(unknown, own_sd=np.sqrt(quick), slopes=slopes, block=block)
-        return self.with_nuisances(replace(self.nuisances, path=path))
+        path = SensorPath(poses, late, blur, block=block)
+        found = self.with_nuisances(replace(self.nuisances, path=path))
+        return found.with_uncertain_path(physics, sd, QUICK)
+
+    def with_uncertain_path(self, physics: Physics, sd: Array, quick: float) -> RecordingResiduals:
+        """Return this with readings as uncertain as its path makes them, under a model of shape (1,).
+
+        Parameters
+        ----------
+        physics
+            The model.
+        sd
+            Standard deviations of an error of the path that lasts for a block [m, m, rad], shape (3,).
+        quick
+            Share of them that changes from row to row.
+        """
+        path = self.nuisances.path
+        assert path is not None
+        slopes = self.reading_slopes(physics, sd)
+        own_sd = np.sqrt(self.noise.reflection_sd**2 + quick**2 * np.sum(slopes**2, axis=1))
+        return self.with_nuisances(replace(self.nuisances, path=replace(path, own_sd=own_sd, slopes=slopes)))
 
     def readings(self, physics: Physics, shift: Array = NO_SHIFT) -> Array:
         """Return the predicted reflection at every row [%]; nan where there is nothing to compare.

@@ -20,6 +20,7 @@ from gecar.reality.replay.replayer import Prediction
 from gecar.reality.replay.smoothed_path import camera_errors, measured_path
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.residuals.registration import beyond_any_path
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
@@ -190,14 +191,16 @@ def _readings_apart(one: Array, other: Array) -> Size:
 def _reading_left(run: RecordingResiduals, physics: Physics, off: Size) -> Size:
     """Return the error of readings beyond what noise and an uncertain path explain: overall or on even floor, if more.
 
-    Along a line a path that is known to 3 mm leaves 30 % of a reading uncertain, and hides what light does to it.
+    Along a line a path that is known to 3 mm leaves 30 % of a reading uncertain; but it lasts (`beyond_any_path`).
     """
     path_sd = np.hypot(PATH_KNOWN, (1e-3 * off.mm_1m, 1e-3 * off.mm_1m, math.radians(off.deg_1m)))
     predicted_sd = run.predicted_reading_sd(physics, path_sd)
     beyond = (run.recording.reflection_pct - run.readings(physics)) ** 2 - predicted_sd**2
     even = beyond[(predicted_sd < EVEN * run.noise.reflection_sd) & ~np.isnan(beyond)]
     on_even = _root_mean(even) if len(even) >= LEAST_ROWS else 0.0
-    return Size(reading_pct=max(_root_mean(beyond), on_even))
+    # A start that was found from readings fits them already.
+    overall = beyond if run.nuisances.start is not None else beyond_any_path(run, physics, path_sd)
+    return Size(reading_pct=max(_root_mean(overall), on_even))
 
 
 def _replayed(run: RecordingResiduals, physics: Physics) -> Prediction:
