@@ -24,7 +24,8 @@ class SensorPath:
     blur_m
         Standard deviation of its positions [m]; an uncertain path sees edges blurred on average.
     own_sd
-        Standard deviation of each reading where the path is known, shape (rows,) [%]; nan: not compared.
+        Standard deviation of each reading by itself: of the sensor, and of what the path's error changes from row to
+        row, shape (rows,) [%]; nan: not compared.
     slopes
         What one standard deviation of the path's x, y and heading changes in each reading, shape (rows, 3) [%].
     block
@@ -44,10 +45,10 @@ class SensorPath:
         return np.asarray(np.sqrt(self.own_sd**2 + np.sum(self.slopes**2, axis=1)))
 
     def whitened(self, errors: Array) -> Array:
-        """Return errors of readings [%], shape (m, rows), in units of their noise, which the path's error shares out.
+        """Return errors of readings [%], shape (m, rows), in units of their noise, the path's error included.
 
-        Over a block of rows the path is off by one place: an edge comes early or late, and is no wider for that.
-        Covariance 1 + G G', as of small changes in `gecar.reality.fitting.discrepancy`, block by block.
+        Over a block of rows the path is off by one place: an edge comes early or late, and is no wider for that. So
+        errors of a block have the covariance 1 + G G', as with small changes (`gecar.reality.fitting.discrepancy`).
         """
         basis, shrinking = self._decomposed
         scaled = errors / self.own_sd

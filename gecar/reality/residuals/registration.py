@@ -20,9 +20,7 @@ Physics = npt.NDArray[Any]
 
 SPAN = 6  # blocks of a path's quick errors: 1.8 s
 ROUNDS = 4
-QUICK = (
-    0.5  # share of the quick errors' standard deviation that changes from row to row, and what is not linear
-)
+ROUGH = 0.5  # share of the quick errors that changes from row to row; it covers what is not linear, too
 
 
 class _Fit(NamedTuple):
@@ -75,7 +73,7 @@ def _fit(run: RecordingResiduals, physics: Physics, shifts: Array, path_sd: Arra
     path = run.nuisances.path
     assert path is not None
     moved = run.with_nuisances(replace(run.nuisances, path=replace(path, poses=path.poses + shifts)))
-    moved = moved.with_uncertain_path(physics, run.noise.path_sd, QUICK)
+    moved = moved.with_uncertain_path(physics, run.noise.path_sd, ROUGH)
     there = moved.nuisances.path
     assert there is not None
     errors = run.recording.reflection_pct - moved.readings(physics)
