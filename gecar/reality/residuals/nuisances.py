@@ -11,6 +11,13 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
+def in_blocks(values: Array, rows: int) -> Array:
+    """Return values by row, shape (n, k), as (blocks, rows of a block, k); the last block is filled up with zeros."""
+    count, columns = -(-len(values) // rows), values.shape[1]
+    filled = np.pad(values, ((0, count * rows - len(values)), (0, 0)))
+    return filled.reshape(count, rows, columns)
+
+
 @dataclass(frozen=True)
 class SensorPath:
     """The path along which a colour sensor was carried.
@@ -52,24 +59,17 @@ class SensorPath:
         """
         basis, shrinking = self._decomposed
         scaled = errors / self.own_sd
-        blocks = self._in_blocks(np.nan_to_num(scaled).T).transpose(0, 2, 1)
-        inside = (blocks @ basis) * shrinking[:, None, :]
-        explained = (inside @ basis.transpose(0, 2, 1)).transpose(0, 2, 1)
-        explained = explained.reshape(len(basis) * self.block, len(errors))
-        return np.asarray(scaled - explained[: errors.shape[1]].T)
+        inside = basis.transpose(0, 2, 1) @ in_blocks(np.nan_to_num(scaled).T, self.block)
+        explained = basis @ (shrinking[:, :, None] * inside)
+        by_row = explained.reshape(len(basis) * self.block, len(errors))
+        return np.asarray(scaled - by_row[: errors.shape[1]].T)
 
     @cached_property
     def _decomposed(self) -> tuple[Array, Array]:
         """Singular vectors of each block's slopes, shape (blocks, rows, 3), and by how much each is shrunk."""
         slopes = np.nan_to_num(self.slopes / self.own_sd[:, None])
-        basis, spread, _ = np.linalg.svd(self._in_blocks(slopes), full_matrices=False)
+        basis, spread, _ = np.linalg.svd(in_blocks(slopes, self.block), full_matrices=False)
         return basis, 1.0 - 1.0 / np.sqrt(1.0 + spread**2)
-
-    def _in_blocks(self, rows: Array) -> Array:
-        """Return values by row, shape (rows, k), as (blocks, rows of a block, k); the last is filled up with zeros."""
-        count, columns = -(-len(rows) // self.block), rows.shape[1]
-        filled = np.pad(rows, ((0, count * self.block - len(rows)), (0, 0)))
-        return filled.reshape(count, self.block, columns)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.residuals.nuisances import in_blocks
 from gecar.reality.residuals.of_recording import RecordingResiduals
 
 Array = npt.NDArray[np.float64]
@@ -79,14 +80,9 @@ def _fit(run: RecordingResiduals, physics: Physics, shifts: Array, path_sd: Arra
     errors = run.recording.reflection_pct - moved.readings(physics)
     longer = there.slopes * (path_sd / run.noise.path_sd)
     whitened = there.whitened(np.vstack([errors, longer.T]))
-    spans = [_in_spans(each, SPAN * path.block) for each in np.nan_to_num(whitened)]
-    own_sd = _in_spans(np.where(np.isnan(whitened[0]), np.nan, there.own_sd), SPAN * path.block)
-    return _Fit(spans[0], np.stack(spans[1:], axis=2), own_sd)
-
-
-def _in_spans(values: Array, rows: int) -> Array:
-    """Return values by row as (spans, rows), the last span filled up with zeros."""
-    return np.pad(values, (0, -len(values) % rows)).reshape(-1, rows)
+    own_sd = np.where(np.isnan(whitened[0]), np.nan, there.own_sd)
+    spans = in_blocks(np.column_stack([np.nan_to_num(whitened.T), own_sd]), SPAN * path.block)
+    return _Fit(spans[:, :, 0], spans[:, :, 1:4], spans[:, :, 4])
 
 
 def _chosen(which: npt.NDArray[np.bool_], one: Array, other: Array) -> Array:
