@@ -13,21 +13,23 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the last kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE
+from support.concealed_worlds import HERE, driven
 
 from benchmarks.concealed import cases
 from benchmarks.concealed.__main__ import main
 from benchmarks.concealed.cases import Manner, draw_case, unlike_neutral
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.history import History
+from benchmarks.concealed.kinds import ALL_OUTSIDE, SETS
 from benchmarks.concealed.kinds.final import FINAL
 from benchmarks.concealed.kinds.outside import OUTSIDE
 from benchmarks.concealed.kinds.sealed import SEALED
+from benchmarks.concealed.kinds.unmet import UNMET
 from benchmarks.concealed.plan import Counts, outside_kinds, plan
 from benchmarks.concealed.recording import channels
 from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
 from benchmarks.concealed.settings import Setting
-from benchmarks.concealed.worlds import WORLDS, holds, truth
+from benchmarks.concealed.worlds import WORLDS, holds
 
 LEFT, RIGHT = 0, 1
 LESS, MORE = -1, 1
@@ -46,16 +48,6 @@ FELT = [
     ({"keeper": (3.0, 0.2)}, STRAIGHT, AHEAD, MORE),
     ({"wander": (LEFT, (0.0, 0.2, 0.2, 0.2))}, STRAIGHT, TURNED, LESS),
 ]
-
-
-def driven(world, concealed, duties):
-    """Drive for 0.5 s with each pair of duties; the pose at the end."""
-    most = len(duties) - 1
-    robot = truth(world, concealed)
-    history = robot.run(
-        (0.0, 0.6, 0.0), lambda time_s, _: duties[min(int(time_s / 0.5), most)], 0.5 * len(duties)
-    )
-    return history.pose[-1]
 
 
 @pytest.mark.parametrize("world", HERE)
@@ -91,9 +83,9 @@ def test_a_camera_sees_its_marker_go_round_the_axle():
     assert seen["heading_deg"] == pytest.approx([90.0, 90.0])
 
 
-@pytest.mark.parametrize("name", FINAL)
+@pytest.mark.parametrize("name", [*FINAL, *UNMET])
 def test_each_kind_is_kept_held_by_all_worlds_and_drawn_again_alike(name):
-    kind = FINAL[name]
+    kind = ALL_OUTSIDE[name]
     (robots, numbers), again = (kind.draw(np.random.default_rng(1), 2, 0.0) for _ in range(2))
     assert (robots, numbers) == again
     assert kind.last
@@ -129,14 +121,15 @@ def test_an_old_seed_plans_what_it_planned_before(background, kinds, digest):
     assert hashlib.sha256(told.encode()).hexdigest()[:16] == digest
 
 
-def test_the_command_plans_cases_of_the_last_kinds(monkeypatch, tmp_path):
+@pytest.mark.parametrize("kinds", ["final", "unmet"])
+def test_the_command_plans_cases_of_a_set_alone(monkeypatch, tmp_path, kinds):
     drawn = []
     monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))
-    world = ["--world", f"continuous:outside={len(FINAL)},mixed=2"]
-    assert main(["plan", "--seed", "3", "--kinds", "final", *world, "--out", str(tmp_path)]) == 0
+    world = ["--world", f"continuous:outside={len(SETS[kinds])},mixed=2"]
+    assert main(["plan", "--seed", "3", "--kinds", kinds, *world, "--out", str(tmp_path)]) == 0
     outside = [case.effects[-1] for case in drawn]
-    assert set(outside) == set(FINAL)
-    assert len(outside) == len(FINAL) + 2
+    assert set(outside) == set(SETS[kinds])
+    assert len(outside) == len(SETS[kinds]) + 2
 
 
 def test_a_label_says_which_kind_and_how_strong(tmp_path, monkeypatch):

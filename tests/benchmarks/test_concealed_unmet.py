@@ -12,11 +12,11 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the kinds unmet are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE
+from support.concealed_worlds import HERE, driven
 
 from benchmarks.concealed import cases
 from benchmarks.concealed.__main__ import main
-from benchmarks.concealed.cases import Manner, draw_case, unlike_neutral
+from benchmarks.concealed.cases import Manner, draw_case
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.history import History
 from benchmarks.concealed.kinds import ALL_OUTSIDE, SETS
@@ -25,7 +25,7 @@ from benchmarks.concealed.plan import outside_kinds
 from benchmarks.concealed.recording import channels
 from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
 from benchmarks.concealed.settings import Setting
-from benchmarks.concealed.worlds import WORLDS, holds, truth
+from benchmarks.concealed.worlds import truth
 
 LEFT = 0
 LESS, MORE = -1, 1
@@ -47,16 +47,6 @@ FELT = [
     ({"grooves": (1.2, math.pi / 4.0)}, STRAIGHT, AHEAD, LESS),
     ({"grooves": (1.2, 0.0)}, BEND, TURNED, MORE),
 ]
-
-
-def driven(world, concealed, duties):
-    """Drive for 0.5 s with each pair of duties; the pose at the end."""
-    most = len(duties) - 1
-    robot = truth(world, concealed)
-    history = robot.run(
-        (0.0, 0.6, 0.0), lambda time_s, _: duties[min(int(time_s / 0.5), most)], 0.5 * len(duties)
-    )
-    return history.pose[-1]
 
 
 @pytest.fixture(scope="module")
@@ -131,16 +121,6 @@ def test_a_clock_of_counted_frames_falls_behind():
     assert seen["x_m"] == pytest.approx(history.time_s[::10] / 1.25)
 
 
-@pytest.mark.parametrize("name", UNMET)
-def test_each_kind_is_kept_held_by_all_worlds_and_drawn_again_alike(name):
-    kind = UNMET[name]
-    (robots, numbers), again = (kind.draw(np.random.default_rng(1), 2, 0.0) for _ in range(2))
-    assert (robots, numbers) == again
-    assert kind.last
-    assert all(holds(world, unlike_neutral(robots[0])) for world in WORLDS)
-    assert json.loads(json.dumps(numbers)) == numbers
-
-
 def test_at_most_two_kinds_differ_from_run_to_run():
     differing = {
         name for name, kind in UNMET.items() if len(set(kind.draw(np.random.default_rng(1), 2, 0.0)[0])) == 2
@@ -156,16 +136,6 @@ def test_sets_share_no_name_and_kinds_unmet_are_drawn_alone_or_not_at_all():
         assert not set(UNMET) & {
             name for kinds in ("met", "last", "final") for name in outside_kinds(manner, kinds)
         }
-
-
-def test_the_command_plans_cases_of_the_kinds_unmet(monkeypatch, tmp_path):
-    drawn = []
-    monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))
-    world = ["--world", f"continuous:outside={len(UNMET)},mixed=2"]
-    assert main(["plan", "--seed", "3", "--kinds", "unmet", *world, "--out", str(tmp_path)]) == 0
-    outside = [case.effects[-1] for case in drawn]
-    assert set(outside) == set(UNMET)
-    assert len(outside) == len(UNMET) + 2
 
 
 def test_one_case_of_any_kind_is_drawn_by_its_name(monkeypatch, tmp_path):
