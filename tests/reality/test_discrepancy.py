@@ -21,6 +21,7 @@ from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.recordings.recording import Case, Recording, write_recording
+from gecar.reality.residuals import parting
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.parting import Sizes
 from gecar.reality.residuals.threads import Threads
@@ -172,6 +173,22 @@ def test_what_dims_readings_shows_on_even_floor_where_a_line_hides_it(even_rows:
     )
     sizes = Sizes((cast("Any", dimmed),), sensor=True)
     assert sizes.left(EV3.physics).reading_pct == pytest.approx(left)
+
+
+@pytest.mark.parametrize(("others", "far"), [(1, False), (2, True)])
+def test_one_of_two_recordings_does_not_decide_what_is_typical(others: int, far: bool) -> None:
+    narrow = EV3.with_effects({"track_width": {"scale": 0.97}})
+    runs = [recorded(EV3, 0), *(recorded(narrow, seed) for seed in range(1, 1 + others))]
+    assert (sizes_of(runs).left(EV3.physics).deg_1m > 3.0) == far
+
+
+def test_what_one_of_two_recordings_shows_at_a_spot_is_that_recordings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sizes = sizes_of([recorded(EV3, seed) for seed in range(2)])
+    left = dict(zip(map(id, sizes.runs), (Size(mm_1m=1.0), Size(mm_1m=9.0)), strict=True))
+    monkeypatch.setattr(parting, "_left_about", lambda run, *_: left[id(run)])
+    assert sizes.left_about(EV3.physics, (0.6, 0.6)) == Size(mm_1m=1.0)
 
 
 def test_laws_may_leave_what_they_are_off_by() -> None:

@@ -118,7 +118,7 @@ class Sizes:
         sizes = [
             _reading_left(run, physics, self.off) if self.sensor else _left(run, physics) for run in self.runs
         ]
-        return combined(sizes, _repeated if repeatedly else statistics.median)
+        return combined(sizes, _repeated if repeatedly else _typical)
 
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
@@ -129,6 +129,11 @@ class Sizes:
         seen = [run for run in self.runs if run.replayer.has_poses]
         passing = [size for run in seen if (size := _left_about(run, physics, spot)) is not None]
         return Size() if len(passing) < min(2, len(seen)) else combined(passing, statistics.median_low)
+
+
+def _typical(sizes: list[float]) -> float:
+    """Return the median; of two the smaller, as half of the larger would decide."""
+    return min(sizes) if len(sizes) == 2 else statistics.median(sizes)
 
 
 def _repeated(sizes: list[float]) -> float:
