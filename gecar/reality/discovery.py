@@ -40,7 +40,7 @@ from gecar.reality.prove.confirmation import (
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case, Recording
-from gecar.reality.recordings.split import Split, hold_out
+from gecar.reality.recordings.split import Split, hold_out, with_enough
 from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.compilation import compiled_replays
@@ -161,7 +161,7 @@ def discover(
     context = _Context(
         known,
         tuple(catalogue),
-        hold_out(case, holdout),
+        with_enough(hold_out(case, holdout)),
         seed,
         tell,
         with_formula,

@@ -12,6 +12,7 @@ from gecar.reality.materiality import Size
 from gecar.world.robot import Robot
 from gecar.world.terms import Term
 
+MOST_NAMED = 8  # recordings
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
 
@@ -183,6 +184,12 @@ class Judgement:
     recordings: tuple[str, ...]
     by_time: bool
     channels: Mapping[str, Misfit]
+
+    @property
+    def named(self) -> str:
+        """The names of the recordings, or their number where there are many."""
+        many = len(self.recordings) > MOST_NAMED
+        return f"{len(self.recordings)} recordings" if many else ", ".join(self.recordings)
 
     @property
     def before(self) -> float:

@@ -76,7 +76,7 @@ def set_aside(verdict: Verdict) -> str:
     judged = verdict.judgement
     if judged.by_time:
         return "the held-out part"
-    return f"recordings not used for the fit ({', '.join(judged.recordings)})"
+    return f"recordings not used for the fit ({judged.named})"
 
 
 def _names(verdict: Verdict) -> str:

@@ -29,7 +29,7 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case, read_case, write_recording
-from gecar.reality.recordings.split import hold_out
+from gecar.reality.recordings.split import ENOUGH_S, hold_out, with_enough
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.residuals.of_recording import residuals_of
 from gecar.reality.verdict import Judgement, Misfit, Residual
@@ -163,6 +163,24 @@ def test_one_recording_is_split_by_time() -> None:
     assert parts.by_time
     assert parts.fitted[0].t_s[-1] < parts.held[0].t_s[-1]
     assert np.flatnonzero(~np.isnan(parts.held[0].x_m[:100])).tolist() == [0]  # where the replay begins
+
+
+def test_of_many_drives_enough_are_fitted_and_the_others_set_aside() -> None:
+    runs = tuple(replace(recorded(EV3, 1), name=f"run_{number:02}") for number in range(30))
+    parts = with_enough(hold_out(Case("many", runs), ["run_29"]))
+    fitted = [int(run.name[-2:]) for run in parts.fitted]
+    assert sum(run.duration_s for run in parts.fitted) <= ENOUGH_S
+    assert fitted[0] == 0
+    assert fitted[-1] == 28
+    assert np.ptp(np.diff(fitted)) <= 1
+    assert parts.spare == 29 - len(fitted)
+    assert next(run.name for run in parts.held) == "run_29"
+    assert sorted(run.name for run in (*parts.fitted, *parts.held)) == [run.name for run in runs]
+    long = tuple(replace(run, t_s=20.0 * run.t_s) for run in runs[:8])
+    benches = tuple(replace(run, setup=replace(run.setup, rig="bench")) for run in runs)
+    for kept in (runs[:8], long, benches):
+        whole = hold_out(Case("whole", kept))
+        assert with_enough(whole) is whole
 
 
 def test_an_unknown_holdout_is_refused_by_name() -> None:

@@ -135,9 +135,7 @@ def gap_figure(verdict: Verdict) -> Figure:
         axes.set(xscale="log", yticks=at, yticklabels=words)
         axes.set_xlabel("NRMSE on recordings not used for the fit (1: as bad as a constant)")
         axes.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, 1.0 + 0.6 / max(len(names), 1)))
-        headline(
-            figure, "How much of the gap is closed", f"judged on {', '.join(verdict.judgement.recordings)}"
-        )
+        headline(figure, "How much of the gap is closed", f"judged on {verdict.judgement.named}")
     return figure
 
 

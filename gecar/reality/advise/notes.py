@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.reality.fitting.model import Step
-from gecar.reality.recordings.split import Split
+from gecar.reality.recordings.split import ENOUGH_S, Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.world.effects import BY_ID
@@ -84,6 +84,11 @@ def notes_on(
     if split.by_time:
         notes.append(
             "There is only one recording: its last part was held out, so validation uses later times of the same run."
+        )
+    if split.spare:
+        notes.append(
+            f"{ENOUGH_S:.0f} s of drives, evenly spread over all recordings, are enough to fit on: {split.spare} more"
+            " were set aside, too."
         )
     if clocks_fitted:
         late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)

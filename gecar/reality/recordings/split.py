@@ -14,6 +14,8 @@ from gecar.reality.recordings.recording import Case, Recording
 
 EVERY = 4  # one recording in so many is set aside
 FIRST_SHARE = 0.7  # of a single recording's time is fitted on
+ENOUGH_S = 100.0  # of drives to fit on: more makes fits slower, and proves less than as many drives set aside
+LEAST = 6  # drives, however long: each is left out in turn
 
 
 @dataclass(frozen=True)
@@ -26,11 +28,14 @@ class Split:
         Recordings.
     by_time
         Whether the last part of the only recording is set aside.
+    spare
+        How many recordings are set aside because enough are left to fit on.
     """
 
     fitted: tuple[Recording, ...]
     held: tuple[Recording, ...]
     by_time: bool = False
+    spare: int = 0
 
 
 def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
@@ -53,6 +58,22 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
     if not fitted:
         raise expected("--holdout", "all recordings", "at least one left to fit on")
     return Split(fitted, tuple(r for r in case.recordings if r.name in wanted))
+
+
+def with_enough(split: Split) -> Split:
+    """Fit on as many drives as are enough, evenly spread over all, and set the others aside, too.
+
+    A search takes as long as what it fits, and what a simulation is off by is the same in the tenth drive and the
+    thirtieth. Recordings of a motor on a bench stay, as each may be of a regime of its own.
+    """
+    total_s = sum(r.duration_s for r in split.fitted)
+    count = max(int(len(split.fitted) * ENOUGH_S / total_s), LEAST)
+    if count >= len(split.fitted) or any(r.setup.rig == "bench" for r in split.fitted):
+        return split
+    kept = np.linspace(0, len(split.fitted) - 1, count).round().astype(int).tolist()
+    fitted = tuple(split.fitted[k] for k in kept)
+    spare = tuple(r for k, r in enumerate(split.fitted) if k not in kept)
+    return replace(split, fitted=fitted, held=(*split.held, *spare), spare=len(spare))
 
 
 def _named(name: str, known: Sequence[str]) -> str:
