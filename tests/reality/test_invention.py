@@ -350,6 +350,16 @@ def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(m
     assert with_oval_wheels(0.004).verdict == "invented"
 
 
+def with_nothing_named(robot, *effects):
+    """Return an explanation of a robot's recordings that names none of some effects, and recordings set aside."""
+    runs = [recorded(robot, seed) for seed in range(6)]
+    noise = estimate_noise(runs, EV3.physics, 1.0)
+    fitted, held = (motion_residuals(some, noise, 1.0, Threads(1)) for some in (runs[:4], runs[4:]))
+    catalogue = [*UNRELATED, *(BY_ID[effect] for effect in effects)]
+    problem = problem_of(fitted, EV3, observable(catalogue, fitted), held=held)
+    return concluded(problem, problem.known, (), explain(problem).tried), held
+
+
 @pytest.mark.parametrize("before", ["nothing", "refused", "another"])
 def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, before):
     """After the law, which hides it till then, before a second one; or taken back where no law holds without it.
@@ -357,17 +367,12 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, be
     An effect that was named for it makes room.
     """
     robot = robot_with(dict(SCRUB)).with_effects({"battery_resistance": {"resistance_ohm": 0.3}})
-    runs = [recorded(robot, seed) for seed in range(6)]
-    noise = estimate_noise(runs, EV3.physics, 1.0)
-    fitted, held = (motion_residuals(some, noise, 1.0, Threads(1)) for some in (runs[:4], runs[4:]))
-    catalogue = [*UNRELATED, BY_ID["battery_resistance"], BY_ID["viscous_friction"]]
-    problem = problem_of(fitted, EV3, observable(catalogue, fitted), held=held)
-    tried = explain(problem).tried
-    explained = concluded(problem, problem.known, (), tried)
+    explained, held = with_nothing_named(robot, "battery_resistance", "viscous_friction")
+    tried = explained.tried
     again = ()
     if before == "another":
         other = next(step for step in tried[0] if step.effect == "viscous_friction")
-        problem = problem.under(other.model)
+        problem = explained.problem.under(other.model)
         taken = problem.estimator.at(other.model, other.model.z)
         explained = replace(explained, problem=problem, taken=taken, steps=(other,))
     if before == "refused":
@@ -386,6 +391,14 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, be
     values = written.explained.taken.values["battery_resistance"]
     assert values["resistance_ohm"] == pytest.approx(0.3, rel=0.05)
     assert written.terms[0].constants["c1"] == pytest.approx(-0.01, rel=0.05)
+
+
+def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
+    robot = robot_with(dict(DRAG)).with_effects({"viscous_friction": {"coefficient_nms": 4e-3}})
+    written = invention.invent(*with_nothing_named(robot, "viscous_friction"), FEW)
+    assert [term.law for term in written.terms] == ["c1 * speed * abs(speed)"]
+    assert [step.effect for step in written.explained.steps] == ["viscous_friction"]
+    assert written.terms[0].constants["c1"] == pytest.approx(-3e-4, rel=0.1)
 
 
 def with_rough_bearings(coefficient_nms):

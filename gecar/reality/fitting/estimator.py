@@ -29,6 +29,7 @@ from gecar.world.robot import Robot
 Array = npt.NDArray[np.float64]
 CACHED_FITS = 2  # whose sensitivities are kept: ten megabytes each
 REFINED_SPREAD = 0.25  # of a parameter's search spread: about a fit that least squares has refined
+FAINT = 1e-9  # a sensitivity that is none
 LEAST_NORM = 1e-6  # weighted sensitivities smaller than this say nothing
 
 
@@ -38,6 +39,11 @@ class FreeParameters(Protocol):
     def physics(self, z: Array) -> npt.NDArray[Any]:
         """Return the physics records of one vector, or of m."""
         ...
+
+
+def directions(slopes: Array) -> Array:
+    """Return orthonormal directions in which an effect changes residuals, shape (n, k)."""
+    return np.linalg.qr(slopes[:, np.linalg.norm(slopes, axis=0) > FAINT])[0]
 
 
 class Estimator:

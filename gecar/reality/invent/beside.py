@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+import numpy.typing as npt
+
+from gecar.reality.fitting.estimator import directions
 from gecar.reality.fitting.model import Step
 from gecar.reality.fitting.parameters import free
-from gecar.reality.invent.written import Written, fitted_without, together, written_with
+from gecar.reality.invent.sentences import shortened
+from gecar.reality.invent.written import Written, fitted_with, fitted_without, together, written_with
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import is_material, stands_out
@@ -16,12 +21,17 @@ from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
 from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
 
+Array = npt.NDArray[np.float64]
+
+AS_MUCH = 0.5  # of what a part of a law does: what an effect's derivative must do, to be tried in its place
+
 
 def with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
     """Exchange and add effects beside the laws, one at a time, while all of them hold with every constant fitted again.
 
     Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
-    another may have stood in for it. To save time those effects alone are tried that gained something without a law.
+    another may have stood in for it; or it may have become a part of a law, as dry friction is ``c * sign(speed)``. To
+    save time those effects alone are tried that gained something without a law.
     """
     gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
     left_out = frozenset(first.problem.catalogue) - gained - refused
@@ -30,6 +40,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals, refused:
         swapped = _with_one_more(without, first, held, left_out)
         if swapped and step.effect not in swapped.explained.taken.effects:
             written = swapped
+    written = _in_place_of_parts(written, first, held, left_out)
     while len(written.explained.taken.effects) < MOST_EFFECTS:
         more = _with_one_more(written, first, held, left_out)
         if more is None:
@@ -42,6 +53,47 @@ def _without(written: Written, first: Explanation, step: Step) -> Written:
     """Return the laws without one of the effects beside them, everything else fitted again."""
     fitted = fitted_without(written, first, step)
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
+
+
+def _in_place_of_parts(
+    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
+) -> Written:
+    """Exchange a part of a law's sum for an effect that explains about as much, as long as there is one.
+
+    A cause of the catalogue goes before a part of a law, unless it explains less by what a name costs.
+    """
+    here = written.explained
+    if len(here.taken.effects) >= MOST_EFFECTS:
+        return written
+    for fewer in shortened(written.terms):
+        if len(fewer) < len(written.terms):  # that is no part, but a law as a whole
+            continue
+        fitted = fitted_with(written, first, fewer)
+        alike = _doing_as_much(here, fitted.errors - here.taken.errors, left_out)
+        if not alike:
+            continue
+        others = frozenset(here.problem.catalogue) - alike
+        swapped = _with_one_more(written_with(written, first, fitted), first, held, others)
+        if swapped and _cost(here, swapped) <= here.taken.cost + PRICE:
+            return _in_place_of_parts(swapped, first, held, left_out)
+    return written
+
+
+def _doing_as_much(here: Explanation, change: Array, left_out: frozenset[str]) -> set[str]:
+    """Return the effects, of those not left out, whose derivatives explain most of a change of the residuals, (n,)."""
+    tried = [e for e in here.problem.catalogue if e not in left_out and e not in here.taken.effects]
+    slopes = here.problem.estimator.sensitivities(here.taken, tried)
+    return {
+        effect
+        for effect, columns in zip(tried, slopes, strict=True)
+        if np.sum((change @ directions(columns)) ** 2) >= AS_MUCH * (change @ change)
+    }
+
+
+def _cost(here: Explanation, written: Written) -> float:
+    """Return what laws and effects cost beside what another explanation leaves."""
+    errors = here.problem.residuals.errors(written.explained.taken.physics)
+    return here.problem.estimator.cost_of(errors)
 
 
 def _with_one_more(

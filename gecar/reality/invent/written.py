@@ -57,11 +57,12 @@ def added(written: Written, first: Explanation, library: Library, law: Law) -> W
 
 
 class Together(NamedTuple):
-    """Laws and effects that were fitted together, with the effects' values and the cost of the fit."""
+    """Laws and effects that were fitted together: the effects' values, and the whitened residuals with their cost."""
 
     terms: tuple[Term, ...]
     effects: tuple[str, ...]
     values: Effects
+    errors: Array
     cost: float
 
 
@@ -73,7 +74,7 @@ def together(
     both = FreeTerms(parameters, start, terms)
     found = least_squares(under.estimator.residual(both), both.z, both.bounds, both.probes, ROUNDS)
     values = parameters.values(found.z[: parameters.size])
-    return Together(both.fitted(found.z), tuple(effects), values, found.cost)
+    return Together(both.fitted(found.z), tuple(effects), values, found.errors, found.cost)
 
 
 def written_with(
@@ -90,6 +91,12 @@ def fitted_without(written: Written, first: Explanation, step: Step) -> Together
     rest = [effect for effect in here.taken.effects if effect != step.effect]
     start = free(first.problem.estimator.robot, rest).vector(here.taken.values)
     return together(first, here.problem, written.terms, rest, start)
+
+
+def fitted_with(written: Written, first: Explanation, terms: tuple[Term, ...]) -> Together:
+    """Fit other laws beside the same effects, from their present values, under the same discrepancy."""
+    here = written.explained
+    return together(first, here.problem, terms, here.taken.effects, here.taken.z)
 
 
 def _explained_with(

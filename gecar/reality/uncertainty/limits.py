@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.fitting.estimator import directions
 from gecar.reality.fitting.initial_values import initial_values, patches
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
@@ -61,16 +62,11 @@ def limits(problem: Problem, model: Model, held: Residuals) -> dict[str, Limit |
         Residuals of the recordings set aside, which must confirm an effect; all may be there if there are none.
     """
     others = [effect for effect in problem.catalogue if effect not in model.effects]
-    rivals = dict(zip(others, map(_directions, problem.estimator.sensitivities(model, others)), strict=True))
+    rivals = dict(zip(others, map(directions, problem.estimator.sensitivities(model, others)), strict=True))
     filmed = problem.with_its_camera(held, model.physics)
     aside = _Held(filmed, filmed.errors(model.physics), filmed.errors(problem.with_small_changes(model)))
     none = problem.residuals.errors(model.physics)
     return {effect: _Search(problem, model, none, aside, rivals, effect).limit() for effect in others}
-
-
-def _directions(slopes: Array) -> Array:
-    """Return orthonormal directions in which an effect changes residuals, shape (n, k)."""
-    return np.linalg.qr(slopes[:, np.linalg.norm(slopes, axis=0) > FAINT])[0]
 
 
 class _Held(NamedTuple):
