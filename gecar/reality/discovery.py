@@ -20,6 +20,7 @@ from gecar.reality.advise.notes import notes_on
 from gecar.reality.evidence import Evidence
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
+from gecar.reality.invent.beside import lessened
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
 from gecar.reality.invent.invention import invent
@@ -50,7 +51,7 @@ from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, concluded, explain
+from gecar.reality.selection.stepwise import Explanation, explain
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -362,19 +363,24 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 
     They are wanted where what is left is material, and where it stands far out of what changes of the robot's constants
     could be; there they must be material themselves. Effects may imitate what no list holds: if what is left beside
-    laws still asks for laws, they are written in the place of the effects, too, and taken if they leave far less, or no
-    more and explain far more.
+    laws still asks for laws, they are written in the place of the effects that they lessen, too (of all if there are no
+    laws), and taken if they leave far less, or no more and explain far more.
     """
     if context.language is None or not (context.invents or _is_left(stage)):
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
     if not (context.invents or stage.explained.unexplained or _is_material(beside)):
         beside = stage
-    if not beside.explained.steps or not _is_left(beside):
+    if not _is_left(beside):
         return beside
-    context.tell(f"laws in the place of {', '.join(step.effect for step in stage.explained.steps)}")
-    problem = stage.explained.problem
-    bare = concluded(problem, problem.known, (), stage.explained.tried)
+    named = stage.explained.steps
+    doubtful = lessened(beside.explained, beside.laws, stage.explained) if beside.laws else named
+    if not doubtful:
+        return beside
+    context.tell(f"laws in the place of {', '.join(step.effect for step in doubtful)}")
+    bare = stage.explained
+    for step in doubtful:
+        bare = dropped(bare, step)
     alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
     gains = [_gain(bare, each) for each in (beside, alone)]
     far_less = _left(alone) < INSTEAD * _left(beside)

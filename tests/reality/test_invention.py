@@ -409,6 +409,17 @@ def with_rough_bearings(coefficient_nms):
     return discover(Case("both", runs), catalogue=catalogue, language=FEW, invents=True)
 
 
+def test_an_effect_that_gains_more_beside_a_law_is_not_doubted(monkeypatch):
+    monkeypatch.setattr(discovery, "_is_left", lambda _: True)
+    told = []
+    rough = robot_with(dict(SCRUB)).with_effects({"viscous_friction": {"coefficient_nms": 8e-3}})
+    case = Case("both", tuple(recorded(rough, seed) for seed in range(5)))
+    verdict = discover(case, catalogue=[BY_ID["viscous_friction"]], language=FEW, tell=told.append)
+    assert [found.id for found in verdict.effects] == ["viscous_friction"]
+    assert any("a law: yaw_moment" in line for line in told)
+    assert not any("in the place of" in line for line in told)
+
+
 def test_sizes_told_of_effects_are_those_fitted_beside_the_law():
     verdict = with_rough_bearings(8e-3)
     assert [law.term.port for law in verdict.invented] == ["yaw_moment"]

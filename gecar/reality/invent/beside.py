@@ -20,6 +20,7 @@ from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
 from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
+from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
 
@@ -144,6 +145,18 @@ def pruned(written: Written, first: Explanation) -> Written:
         if not (stays and (problem.on_bench or is_material(problem, here, step))):
             written = written_with(written, first, without, problem)
     return written
+
+
+def lessened(beside: Explanation, laws: tuple[Term, ...], first: Explanation) -> list[Step]:
+    """Return the effects that gain less beside laws than without: they may stand in for a part of what those explain.
+
+    Laws that are right take away what hides a cause, which then gains more.
+    """
+    written = Written(beside, laws, ())
+    gains = {
+        step.effect: fitted_without(written, first, step).cost - beside.taken.cost for step in beside.steps
+    }
+    return [step for step in first.steps if gains.get(step.effect, step.gain) < step.gain]
 
 
 def taken_back(explained: Explanation, refused: Sequence[Step]) -> Explanation:
