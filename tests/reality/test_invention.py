@@ -399,6 +399,11 @@ def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
     assert [term.law for term in written.terms] == ["c1 * speed * abs(speed)"]
     assert [step.effect for step in written.explained.steps] == ["viscous_friction"]
     assert written.terms[0].constants["c1"] == pytest.approx(-3e-4, rel=0.1)
+    (told,) = written.invented
+    assert list(told.range) == ["speed"]
+    rest = EV3.with_effects(written.explained.taken.values)
+    whole = rest.with_terms(written.terms)
+    assert told.size == written.explained.problem.sizes.apart(whole.physics, rest.physics)
 
 
 def with_rough_bearings(coefficient_nms):

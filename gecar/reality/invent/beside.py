@@ -12,7 +12,14 @@ from gecar.reality.fitting.estimator import directions
 from gecar.reality.fitting.model import Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.invent.sentences import shortened
-from gecar.reality.invent.written import Written, fitted_with, fitted_without, together, written_with
+from gecar.reality.invent.written import (
+    Together,
+    Written,
+    fitted_with,
+    fitted_without,
+    together,
+    written_with,
+)
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import is_material, stands_out
@@ -37,7 +44,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals, refused:
     gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
     left_out = frozenset(first.problem.catalogue) - gained - refused
     for step in written.explained.steps:
-        without = _without(written, first, step)
+        without = _refitted(written, first, fitted_without(written, first, step))
         swapped = _with_one_more(without, first, held, left_out)
         if swapped and step.effect not in swapped.explained.taken.effects:
             written = swapped
@@ -50,9 +57,8 @@ def with_effects(written: Written, first: Explanation, held: Residuals, refused:
     return written
 
 
-def _without(written: Written, first: Explanation, step: Step) -> Written:
-    """Return the laws without one of the effects beside them, everything else fitted again."""
-    fitted = fitted_without(written, first, step)
+def _refitted(written: Written, first: Explanation, fitted: Together) -> Written:
+    """Return laws and effects as they were fitted again, with what is known of how the effects were taken."""
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
 
 
@@ -74,7 +80,7 @@ def _in_place_of_parts(
         if not alike:
             continue
         others = frozenset(here.problem.catalogue) - alike
-        swapped = _with_one_more(written_with(written, first, fitted), first, held, others)
+        swapped = _with_one_more(_refitted(written, first, fitted), first, held, others)
         if swapped and _cost(here, swapped) <= here.taken.cost + PRICE:
             return _in_place_of_parts(swapped, first, held, left_out)
     return written
