@@ -402,6 +402,13 @@ def test_beside_a_path_that_is_off_what_moves_the_spot_must_explain_nearly_all(
     assert [step.effect for step in again.candidates] == [VISCOUS] * (not kept)
 
 
+def test_an_effect_stands_out_though_noise_costs_a_hundred_times_what_it_gains() -> None:
+    problem = linear_problem(linear({VISCOUS: 3.0}, {VISCOUS: bumps(5, 4, 0.05)}))
+    stage = candidate_steps(problem, problem.known)
+    assert 10.0 < stage[0].gain < 0.02 * problem.known.cost
+    assert stands_out(problem, stage[0])
+
+
 def test_an_effect_that_explains_next_to_nothing_is_uneven() -> None:
     explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
     (step,) = explained.steps

@@ -13,14 +13,14 @@ from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import Size
 from gecar.reality.replay.kernel import TIMING
 from gecar.reality.residuals.parting import Sizes
+from gecar.reality.selection.homogeneity import heterogeneity
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.share import spread_of_size
 from gecar.reality.selection.thresholds import (
     BREAKAWAY_SPEED,
     COMPETING,
     LEAST_INVERSE,
-    NEGLIGIBLE,
     PRICE,
+    PROMISING,
     SIGNIFICANCE,
     STEADY,
     STOPPED,
@@ -183,7 +183,9 @@ def most_uneven(problem: Problem, steps: Sequence[Step]) -> Step | None:
 
 
 def unevenness(problem: Problem, step: Step) -> float:
-    """Return the relative spread of an effect's size over recordings; infinite where it explains next to nothing.
+    """Return the spread of an effect's size over recordings beyond sampling noise; infinite where it gains too little.
+
+    Relative to the size. What gains less than an effect must to be kept has none.
 
     Parameters
     ----------
@@ -193,6 +195,7 @@ def unevenness(problem: Problem, step: Step) -> float:
         By which the effect was taken.
     """
     without, with_effect = problem.estimator.models_of(step)
-    if without.cost - with_effect.cost < NEGLIGIBLE * without.cost:
+    if without.cost - with_effect.cost < PROMISING * PRICE:
         return math.inf
-    return spread_of_size(problem.estimator.blocks.folds, without.errors, with_effect.errors)
+    folds = problem.estimator.blocks.folds.astype(np.intp)
+    return heterogeneity(folds, without.errors, with_effect.errors).relative
