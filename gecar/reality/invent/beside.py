@@ -34,23 +34,20 @@ Array = npt.NDArray[np.float64]
 AS_MUCH = 0.5  # of what a part of a law does: what an effect's derivative must do, to be tried in its place
 
 
-def with_effects(written: Written, first: Explanation, held: Residuals, refused: set[str]) -> Written:
+def with_effects(written: Written, first: Explanation, held: Residuals) -> Written:
     """Exchange and add effects beside the laws, one at a time, while all of them hold with every constant fitted again.
 
     Beside what no list holds, a cause may have been refused, as its size seemed to differ between recordings, or
-    another may have stood in for it; or it may have become a part of a law, as dry friction is ``c * sign(speed)``. To
-    save time those effects alone are tried that gained something without a law.
+    another may have stood in for it; or it may have become a part of a law, as dry friction is ``c * sign(speed)``.
     """
-    gained = {step.effect for stage in first.tried for step in stage if step.gain >= PRICE}
-    left_out = frozenset(first.problem.catalogue) - gained - refused
     for step in written.explained.steps:
         without = _refitted(written, first, fitted_without(written, first, step))
-        swapped = _with_one_more(without, first, held, left_out)
+        swapped = _with_one_more(without, first, held)
         if swapped and step.effect not in swapped.explained.taken.effects:
             written = swapped
-    written = _in_place_of_parts(written, first, held, left_out)
+    written = _in_place_of_parts(written, first, held)
     while len(written.explained.taken.effects) < MOST_EFFECTS:
-        more = _with_one_more(written, first, held, left_out)
+        more = _with_one_more(written, first, held)
         if more is None:
             break
         written = more
@@ -62,9 +59,7 @@ def _refitted(written: Written, first: Explanation, fitted: Together) -> Written
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
 
 
-def _in_place_of_parts(
-    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
-) -> Written:
+def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) -> Written:
     """Exchange a part of a law's sum for an effect that explains about as much, as long as there is one.
 
     A cause of the catalogue goes before a part of a law, unless it explains less by what a name costs.
@@ -76,19 +71,19 @@ def _in_place_of_parts(
         if len(fewer) < len(written.terms):  # that is no part, but a law as a whole
             continue
         fitted = fitted_with(written, first, fewer)
-        alike = _doing_as_much(here, fitted.errors - here.taken.errors, left_out)
+        alike = _doing_as_much(here, fitted.errors - here.taken.errors)
         if not alike:
             continue
         others = frozenset(here.problem.catalogue) - alike
         swapped = _with_one_more(_refitted(written, first, fitted), first, held, others)
         if swapped and _cost(here, swapped) <= here.taken.cost + PRICE:
-            return _in_place_of_parts(swapped, first, held, left_out)
+            return _in_place_of_parts(swapped, first, held)
     return written
 
 
-def _doing_as_much(here: Explanation, change: Array, left_out: frozenset[str]) -> set[str]:
-    """Return the effects, of those not left out, whose derivatives explain most of a change of the residuals, (n,)."""
-    tried = [e for e in here.problem.catalogue if e not in left_out and e not in here.taken.effects]
+def _doing_as_much(here: Explanation, change: Array) -> set[str]:
+    """Return the effects whose derivatives explain most of a change of the residuals, shape (n,)."""
+    tried = [effect for effect in here.problem.catalogue if effect not in here.taken.effects]
     slopes = here.problem.estimator.sensitivities(here.taken, tried)
     return {
         effect
@@ -104,7 +99,7 @@ def _cost(here: Explanation, written: Written) -> float:
 
 
 def _with_one_more(
-    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str]
+    written: Written, first: Explanation, held: Residuals, left_out: frozenset[str] = frozenset()
 ) -> Written | None:
     """Add the best effect that holds beside laws and effects, of those not left out; None if there is none."""
     here = written.explained

@@ -119,7 +119,7 @@ def invent(
         # In mm of an EV3's wheel little of another motor is material: on a bench a law must prove itself, and no more.
         if problem.on_bench:
             continue
-        written = with_effects(written, first, held, {step.effect for step in refused})
+        written = with_effects(written, first, held)
         first = replace(first, steps=written.explained.steps)
         if not written.explained.unexplained:
             break
