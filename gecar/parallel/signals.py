@@ -17,21 +17,15 @@ def remember_interrupts() -> None:
     """Let a Ctrl-C raise `KeyboardInterrupt`, as usual, and remember it for `raise_if_interrupted`.
 
     An extension module may drop the exception if it comes while the module asks Python for something, as many do while
-    they are imported; once a run went on. So does Python where an object is being deleted, and prints a traceback: here
-    it prints none. A Ctrl-C that the shell has this process ignore stays ignored.
+    they are imported; once a run went on. A Ctrl-C that the shell has this process ignore stays ignored.
     """
 
     def remember(number: int, frame: FrameType | None) -> None:
         _interrupted.set()
         signal.default_int_handler(number, frame)
 
-    def told_if_no_interrupt(dropped: sys.UnraisableHookArgs) -> None:
-        if not issubclass(dropped.exc_type, KeyboardInterrupt):
-            sys.__unraisablehook__(dropped)
-
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, remember)
-        sys.unraisablehook = told_if_no_interrupt
 
 
 def raise_if_interrupted() -> None:
