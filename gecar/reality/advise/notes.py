@@ -87,7 +87,7 @@ def notes_on(
         )
     if split.spare:
         notes.append(
-            f"{ENOUGH_S:.0f} s of drives, evenly spread over all recordings, are enough to fit on: {split.spare} more"
+            f"{ENOUGH_S:.0f} s of drives, spread over all recordings, are enough to fit on: {split.spare} more"
             " were set aside, too."
         )
     if clocks_fitted:

@@ -15,6 +15,7 @@ from gecar.reality.recordings.recording import Case, Recording
 EVERY = 4  # one recording in so many is set aside
 FIRST_SHARE = 0.7  # of a single recording's time is fitted on
 ENOUGH_S = 100.0  # of drives to fit on: more makes fits slower, and proves less than as many drives set aside
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 LEAST = 6  # drives, however long: each is left out in turn
 
 
@@ -61,7 +62,9 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
 
 
 def with_enough(split: Split) -> Split:
-    """Fit on as many drives as are enough, evenly spread over all, and set the others aside, too.
+    """Fit on as many drives as are enough, spread over all, and set the others aside, too.
+
+    They are spread as multiples of the golden ratio are: evenly, and not at the pace of kinds that take turns.
 
     A search takes as long as what it fits, and what a simulation is off by is the same in the tenth drive and the
     thirtieth. Recordings of a motor on a bench stay, as each may be of a regime of its own.
@@ -70,7 +73,8 @@ def with_enough(split: Split) -> Split:
     count = max(int(len(split.fitted) * ENOUGH_S / total_s), LEAST)
     if count >= len(split.fitted) or any(r.setup.rig == "bench" for r in split.fitted):
         return split
-    kept = np.linspace(0, len(split.fitted) - 1, count).round().astype(int).tolist()
+    spread = (np.arange(1, 20 * len(split.fitted)) * GOLDEN) % 1.0 * len(split.fitted)
+    kept = sorted(list(dict.fromkeys(spread.astype(int).tolist()))[:count])
     fitted = tuple(split.fitted[k] for k in kept)
     spare = tuple(r for k, r in enumerate(split.fitted) if k not in kept)
     return replace(split, fitted=fitted, held=(*split.held, *spare), spare=len(spare))
