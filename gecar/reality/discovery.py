@@ -401,8 +401,7 @@ def _is_material(stage: _Stage) -> bool:
 
 def _gain(bare: Explanation, stage: _Stage) -> float:
     """Return what a stage's robot gains in log-likelihood over a bare explanation's, beside what that leaves."""
-    residuals, estimator = bare.problem.residuals, bare.problem.estimator
-    before, after = (estimator.cost_of(residuals.errors(e.taken.physics)) for e in (bare, stage.explained))
+    before, after = (bare.problem.cost_of(e.taken.physics) for e in (bare, stage.explained))
     return before - after
 
 

@@ -42,7 +42,7 @@ class FreeParameters(Protocol):
 
 
 def directions(slopes: Array) -> Array:
-    """Return orthonormal directions in which an effect changes residuals, shape (n, k)."""
+    """Return orthonormal directions, shape (n, k), in which an effect with these slopes changes residuals."""
     return np.linalg.qr(slopes[:, np.linalg.norm(slopes, axis=0) > FAINT])[0]
 
 

@@ -76,7 +76,7 @@ def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) ->
             continue
         others = frozenset(here.problem.catalogue) - alike
         swapped = _with_one_more(_refitted(written, first, fitted), first, held, others)
-        if swapped and _cost(here, swapped) <= here.taken.cost + PRICE:
+        if swapped and here.problem.cost_of(swapped.explained.taken.physics) <= here.taken.cost + PRICE:
             return _in_place_of_parts(swapped, first, held)
     return written
 
@@ -90,12 +90,6 @@ def _doing_as_much(here: Explanation, change: Array) -> set[str]:
         for effect, columns in zip(tried, slopes, strict=True)
         if np.sum((change @ directions(columns)) ** 2) >= AS_MUCH * (change @ change)
     }
-
-
-def _cost(here: Explanation, written: Written) -> float:
-    """Return what laws and effects cost beside what another explanation leaves."""
-    errors = here.problem.residuals.errors(written.explained.taken.physics)
-    return here.problem.estimator.cost_of(errors)
 
 
 def _with_one_more(

@@ -216,7 +216,7 @@ def _first_beside(
         library = Library(first.problem, first.taken)
         laws = sorted((fit(library, law.terms) for law in found), key=lambda law: -law.worth)
         physics = laws[0].parameters.physics(laws[0].minimum.z)
-        cost_of_all = explained.problem.estimator.cost_of(explained.problem.residuals.errors(physics))
+        cost_of_all = explained.problem.cost_of(physics)
         tried.append((cost_of_all + PRICE * len(some), first, library, laws))
     for _, first, library, laws in sorted(tried, key=lambda each: each[0]):
         holds = _first_that_holds(Written(first, (), ()), first, library, laws, held, nulls)

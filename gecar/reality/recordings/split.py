@@ -62,7 +62,7 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
 
 
 def with_enough(split: Split) -> Split:
-    """Fit on as many drives as are enough, spread over all, and set the others aside, too.
+    """Fit on no more drives than are enough, spread over all of them, and set the others aside, too.
 
     They are spread as multiples of the golden ratio are: evenly, and not at the pace of kinds that take turns.
 

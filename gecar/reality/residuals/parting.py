@@ -132,7 +132,7 @@ class Sizes:
 
 
 def _typical(sizes: list[float]) -> float:
-    """Return the median; of two the smaller, as half of the larger would decide."""
+    """Return the median; of two the smaller, as their mean would let one bad recording decide."""
     return min(sizes) if len(sizes) == 2 else statistics.median(sizes)
 
 

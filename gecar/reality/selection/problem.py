@@ -112,6 +112,10 @@ class Problem:
         """Whether all recordings were made on a bench."""
         return self.estimator.on_bench
 
+    def cost_of(self, physics: Physics) -> float:
+        """Return the cost of the residuals that a physics record, shape (1,), leaves."""
+        return self.estimator.cost_of(self.residuals.errors(physics))
+
     def without(self, number: int) -> tuple[Problem, Residuals]:
         """Return the problem without one recording, and that recording's residuals."""
         numbers = [k for k in range(len(self.residuals.recordings)) if k != number]
@@ -292,7 +296,7 @@ class Problem:
         """
         if not (self.clocks_fitted and model.effects) or self.residuals.sensor:
             return None
-        problem, now = self, self.estimator.cost_of(self.residuals.errors(model.physics))
+        problem, now = self, self.cost_of(model.physics)
         before = now
         for _ in range(RENEWALS):
             problem = problem._on(with_fitted_clocks(problem.residuals, model.physics)[0])
