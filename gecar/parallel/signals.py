@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+A_MOMENT = 0.01  # s; a deletion takes microseconds
+
 _interrupted = threading.Event()
 
 
@@ -17,15 +19,33 @@ def remember_interrupts() -> None:
     """Let a Ctrl-C raise `KeyboardInterrupt`, as usual, and remember it for `raise_if_interrupted`.
 
     An extension module may drop the exception if it comes while the module asks Python for something, as many do while
-    they are imported; once a run went on. A Ctrl-C that the shell has this process ignore stays ignored.
+    they are imported; once a run went on. Python itself drops it where an object is being deleted, and prints a
+    traceback: there it is raised a moment later. A Ctrl-C that the shell has this process ignore stays ignored.
     """
 
     def remember(number: int, frame: FrameType | None) -> None:
         _interrupted.set()
-        signal.default_int_handler(number, frame)
+        if _deletes(frame) and sys.platform != "win32":
+            signal.signal(signal.SIGALRM, try_again)
+            signal.setitimer(signal.ITIMER_REAL, A_MOMENT)
+        else:
+            signal.default_int_handler(number, frame)
+
+    def try_again(number: int, frame: FrameType | None) -> None:
+        if _interrupted.is_set():  # not answered by a loop meanwhile
+            remember(number, frame)
 
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, remember)
+
+
+def _deletes(frame: FrameType | None) -> bool:
+    """Tell whether what runs is part of an object's deletion."""
+    while frame is not None:
+        if frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def raise_if_interrupted() -> None:

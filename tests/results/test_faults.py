@@ -154,3 +154,30 @@ def test_an_interrupt_that_something_dropped_is_raised_at_the_next_turn() -> Non
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_an_interrupt_in_a_deletion_comes_a_moment_later(capfd: pytest.CaptureFixture[str]) -> None:
+    class Interrupted:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            deleted.append(True)
+
+    def delete_one() -> None:
+        Interrupted()
+        assert deleted == [True]  # whole
+        time.sleep(1.0)
+
+    deleted: list[bool] = []
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    alarm = signal.getsignal(signal.SIGALRM)
+    try:
+        remember_interrupts()
+        with pytest.raises(KeyboardInterrupt):
+            delete_one()
+        with pytest.raises(KeyboardInterrupt):
+            raise_if_interrupted()
+    finally:
+        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGALRM, alarm)
+    assert capfd.readouterr().err == ""
