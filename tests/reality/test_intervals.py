@@ -117,3 +117,16 @@ def test_the_interval_of_a_patch_holds_the_truth_and_follows_the_seed(
     assert all(found[name].low < value < found[name].high for name, value in patch.items())
     assert intervals(estimator, model, seed=1)["slippery_patch"] == found
     assert intervals(estimator, model, seed=2)["slippery_patch"] != found
+
+
+def test_a_size_known_by_its_product_with_a_share_is_not_neutral() -> None:
+    """Commands of 10 % and more never fall into a dead band of 1 %: they tell how much of it each of them loses."""
+    effect = "dead_band"
+    runs = [recorded(EV3.with_effects({effect: {"duty_pct": 1.0, "offset_share": 1.0}}), k) for k in range(3)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    estimator = problem_of(residuals, EV3, (effect,)).estimator
+    model = estimator.fit((effect,), {effect: {"duty_pct": 3.0, "offset_share": 0.3}})
+    assert half_widths(estimator, model)[0] > model.z[0]
+    spans = intervals(estimator, model)
+    assert not contains_neutral(model, effect, spans)
+    assert 0.5 < spans[effect]["duty_pct"].low < 1.0 < spans[effect]["duty_pct"].high

@@ -26,16 +26,12 @@ FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives 
 FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
 
 
-def deviations(estimator: Estimator, model: Model) -> Array:
-    """Return standard deviations of a model's coordinates, shape (k,)."""
-    return half_widths(estimator, model) / NORMAL_95
-
-
 def half_widths(estimator: Estimator, model: Model) -> Array:
     """Return half the 95 % intervals of a model's coordinates, shape (k,).
 
-    The larger of two: a sandwich over half-second spans, which holds whatever the noise's correlation, and the
-    jackknife over recordings with Student's t, which also holds what no noise model knows.
+    The largest of three: what the noise as it is known to be makes of them, which is without bound along a valley; a
+    sandwich over half-second spans, which holds whatever the noise's correlation; and the jackknife over recordings
+    with Student's t, which also holds what no noise model knows.
 
     Sources: White, Econometrica 48 (1980) 817; Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
     """
@@ -48,7 +44,7 @@ def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
     scores = np.stack([np.bincount(blocks.spans, s * w * errors) for s in slopes.T], axis=1)
-    sandwich = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 0.0)
+    variances = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), np.diag(inverse))
     leaps = []
     for k in np.unique(blocks.folds):
         rows = blocks.folds == k
@@ -58,9 +54,9 @@ def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
         )
     folds = len(leaps)
     if folds < 2:
-        return NORMAL_95 * np.sqrt(sandwich)
+        return NORMAL_95 * np.sqrt(variances)
     jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    return np.maximum(NORMAL_95 * np.sqrt(sandwich), student.ppf(0.975, folds - 1) * np.sqrt(jack))
+    return np.maximum(NORMAL_95 * np.sqrt(variances), student.ppf(0.975, folds - 1) * np.sqrt(jack))
 
 
 def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
@@ -90,6 +86,16 @@ def _is_place(model: Model, spans: Mapping[str, Interval]) -> bool:
     return radius.high < KNOWN * radius.low or grip.high < 0.5 * elsewhere
 
 
+def _is_one_of_several(model: Model, k: int) -> bool:
+    """Whether a coordinate is the size of an effect that has other parameters.
+
+    A size and the share of it that counts may be known by their product alone: a straight line along that valley goes
+    through neutral, and the valley does not.
+    """
+    coordinate = model.parameters.coordinates[k]
+    return coordinate.parameter.worthwhile > 0.0 and len(coordinate.effect.parameters) > 1
+
+
 def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
     """Return 95 % intervals of every parameter of a model, by effect and label."""
     if not model.effects:
@@ -109,7 +115,7 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
         size = c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step
         if k in spans:
             down, up = spans[k]
-        elif half > NORMAL_95 * FLAT:
+        elif half > NORMAL_95 * FLAT or (abs(z) <= half and _is_one_of_several(model, k)):
             down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
         else:
             down = up = float(half)
