@@ -51,7 +51,7 @@ from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, explain
+from gecar.reality.selection.stepwise import Explanation, explain, resumed
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -305,6 +305,7 @@ def _explained_without(
     """Explain motion without the encoders, or without the poses, where nothing explains those; None if that fails.
 
     One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
+    What was found may explain both: then no first effect was seen among all that two causes do together.
     """
     measured = {name for run in fitted.recordings for name in run.recording.measured}
     alone, beside = (residuals.without(instrument) for residuals in (fitted, held))
@@ -323,6 +324,10 @@ def _explained_without(
         or worsens(problem, problem.known, taken, whole)
     ):
         return None
+    both = resumed(_problem(context, context.robot, fitted, held), motion.explained)
+    seen = _with_intervals(context, confirmed(both, held), held)
+    if not (seen.explained.unexplained or seen.candidates):
+        return seen
     explained = replace(motion.explained, left=whole.left(taken.physics), unexplained=True)
     return replace(motion, explained=explained, left_out=instrument)
 

@@ -27,7 +27,7 @@ from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, share_asked_for
-from gecar.reality.selection.stepwise import explain
+from gecar.reality.selection.stepwise import explain, resumed
 from gecar.reality.selection.thresholds import table
 from gecar.world.rollout import STEP_S
 
@@ -148,6 +148,20 @@ def test_two_causes_are_both_taken_and_nothing_else() -> None:
     explained = explain(linear_problem(linear({VISCOUS: 3.0, TRACK: 4.0}, RESPONSES)))
     assert {step.effect for step in explained.steps} == {VISCOUS, TRACK}
     assert not explained.unexplained
+
+
+def test_what_a_part_shows_may_explain_all_and_is_judged_by_all() -> None:
+    """Effects found in two recordings of four: in the others, too, there are both, or only one."""
+    both = linear({VISCOUS: 3.0, TRACK: 4.0}, RESPONSES)
+    found = explain(linear_problem(both.part([0, 1])))
+    assert {step.effect for step in found.steps} == {VISCOUS, TRACK}
+    explained = resumed(linear_problem(both), found)
+    assert {step.effect for step in explained.steps} == {VISCOUS, TRACK}
+    assert sorted(explained.taken.z) == pytest.approx([3.0, 4.0], abs=0.1)
+    assert all(len(step.base.errors) == len(both.noise) for step in explained.steps)
+    assert not explained.unexplained
+    one = linear({VISCOUS: 3.0}, RESPONSES)
+    assert [step.effect for step in resumed(linear_problem(one), found).steps] == [VISCOUS]
 
 
 def test_nothing_is_taken_from_noise() -> None:

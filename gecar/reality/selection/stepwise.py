@@ -174,6 +174,15 @@ def concluded(
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
+def resumed(problem: Problem, found: Explanation) -> Explanation:
+    """Return what effects that were found in a part of the residuals explain of all of them, each judged anew."""
+    effects = [step.effect for step in found.steps]
+    model = problem.under(problem.known, effects).estimator.fit(effects, found.taken.values)
+    steps = [beside_others(problem.under(model), model, step) for step in found.steps]
+    model, kept = _swapped_and_dropped(problem, _Chain(tuple(steps), model, ()), ())
+    return concluded(problem, model, kept, found.tried)
+
+
 def _standing_beside(
     problem: Problem, model: Model, steps: Sequence[Step], now: float, before: float
 ) -> list[Step]:
