@@ -39,7 +39,7 @@ def sentences(verdict: Verdict) -> list[str]:
         named = "; ".join(
             f"{BY_ID[m.id].title} ({m.id}), which {does(m.size, verdict)}" for m in verdict.minor
         )
-        out.append(f"Visible, but too small to be material; possibly: {named}.")
+        out.append(f"Visible, but too small to be named; possibly: {named}.")
     if verdict.found and not verdict.residual.material and not verdict.judgement.failed:
         out.append(f"The remaining error {does(verdict.residual.size, verdict)}, which is not material.")
     if verdict.residual.material or verdict.verdict.endswith("unexplained"):

@@ -180,7 +180,7 @@ def _found(verdict: Verdict, laws: str) -> str:
         parts.append(f"<h2>The remaining error</h2><p>{_text(unexplained(verdict))}</p>")
     if verdict.minor:
         rows = "".join(f"<li>{_one(minor, verdict)}</li>" for minor in verdict.minor)
-        parts.append(f"<h2>Visible, but too small to be material</h2><ul>{rows}</ul>")
+        parts.append(f"<h2>Visible, but too small to be named</h2><ul>{rows}</ul>")
     notes = "".join(f"<li>{_text(_in_words(note))}</li>" for note in verdict.notes)
     return "".join(parts) + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
 
