@@ -53,7 +53,7 @@ from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, explain, resumed
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
-from gecar.reality.uncertainty.intervals import contains_neutral, intervals
+from gecar.reality.uncertainty.intervals import contains_neutral, hulls, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
 from gecar.reality.verdict import (
@@ -457,12 +457,14 @@ def _with_intervals(context: _Context, confirmation: Confirmation, held: Residua
 def _spans(context: _Context, explained: Explanation, named: Spans | None = None) -> Spans:
     """Return the intervals of an explanation's effects, small ones too; on a bench along the valleys they lie in.
 
-    ``named`` are those of its named effects, if they are known without valleys.
+    Small ones are not claimed, but they may be there: intervals hold for robots with and without them.
+    ``named`` are those of its named effects without them, if they are known without valleys.
     """
     problem, taken = explained.problem, explained.taken
     spans = named if named is not None else intervals(problem.estimator, taken, context.seed)
     if explained.minor:
-        spans = {**intervals(problem.estimator, explained.whole, context.seed), **spans}
+        beside = intervals(problem.estimator, explained.whole, context.seed)
+        spans = {effect: hulls(of, spans.get(effect, of)) for effect, of in beside.items()}
     return along_valleys(problem, taken, spans) if explained.steps and problem.on_bench else spans
 
 

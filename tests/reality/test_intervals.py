@@ -21,7 +21,7 @@ from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import explain
-from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, intervals
+from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, hulls, intervals
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID
 
@@ -130,3 +130,8 @@ def test_a_size_known_by_its_product_with_a_share_is_not_neutral() -> None:
     spans = intervals(estimator, model)
     assert not contains_neutral(model, effect, spans)
     assert 0.5 < spans[effect]["duty_pct"].low < 1.0 < spans[effect]["duty_pct"].high
+
+
+def test_intervals_hold_for_robots_with_and_without_what_is_too_small_to_be_named() -> None:
+    named, beside = Interval(7.0, 5.3, 8.7, "ms"), Interval(9.7, 8.2, 11.2, "ms")
+    assert hulls({"time": beside}, {"time": named}) == {"time": Interval(7.0, 5.3, 11.2, "ms")}
