@@ -56,6 +56,17 @@ def test_a_command_changes_in_a_gap_when_the_wheels_tell(whole: Recording, noise
     assert np.array_equal(found.commands, missing.commands)
 
 
+def test_without_encoders_and_gyro_it_is_told_by_where_the_robot_was_seen(
+    whole: Recording, noise: Noise
+) -> None:
+    unseen = np.full(len(whole.t_s), np.nan)
+    whole = replace(whole, left_angle_rad=unseen, right_angle_rad=unseen)
+    for lost in (CHANGED, np.subtract(CHANGED, 1)):  # the next command came at once, or after the gap
+        kept = np.setdiff1d(np.arange(len(whole.t_s)), lost)
+        found = mended(only(whole, kept), noise)
+        assert found.lost_t_s == pytest.approx(whole.t_s[list(CHANGED)], abs=0.003)
+
+
 def test_a_command_that_changed_after_the_gap_stays_where_it_is(whole: Recording, noise: Noise) -> None:
     kept = np.setdiff1d(np.arange(len(whole.t_s)), np.subtract(CHANGED, 1))
     found = mended(only(whole, kept), noise)

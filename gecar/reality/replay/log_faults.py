@@ -1,4 +1,4 @@
-"""Repair of logs that miss rows or whose times jitter, by how the wheels moved.
+"""Repair of logs that miss rows or whose times jitter, by how the wheels moved, or else by where the robot was seen.
 
 A brick that is busy drops rows, and the command of such a row is not known: held on until the next row, a step comes
 late by a row's time. One that writes a row a moment after it read its sensors gives a step the wrong time by as much.
@@ -19,6 +19,7 @@ from gecar.reality.replay.replayer import replayer_of
 
 Array = npt.NDArray[np.float64]
 
+WHEELS = frozenset({"left_angle_rad", "right_angle_rad", "yaw_rate_rad_s"})
 LEAST_CHANGE = 0.005  # of duty: smaller ones move nothing
 AFTER_S = 0.4  # for which wheels tell when a command changed
 CLIP = 5.0  # standard deviations that one sample counts at most
@@ -44,8 +45,12 @@ def without_log_faults(
     """
 
     def off(tried: Recording) -> Array:
-        """Return the squared residual of angles and yaw rate at each row, shape (rows,)."""
-        errors = replayer_of(tried, sd, walk, memory_s).play(physics).row_errors[:, [0, 1, 3]]
+        """Return the squared residual at each row, shape (rows,): of angles and yaw rate; without these, of poses."""
+        found = replayer_of(tried, sd, walk, memory_s).play(physics)
+        errors = found.row_errors[:, [0, 1, 3]]
+        if WHEELS.isdisjoint(tried.measured):
+            poses = np.column_stack([tried.x_m, tried.y_m, tried.heading_rad])
+            errors[~np.isnan(poses).all(axis=1)] = found.pose_errors
         return np.asarray(np.minimum(np.nan_to_num(errors) ** 2, CLIP**2).sum(axis=1))
 
     if len(recording.t_s) < 3:
