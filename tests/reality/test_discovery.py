@@ -110,6 +110,15 @@ def test_every_effect_has_places_to_start_from_whichever_columns_are_missing(
         assert all(np.isfinite(freedom.vector({effect.id: s})).all() for s in begun)
 
 
+def test_the_search_for_a_sensor_begins_nearer_than_an_edge_is_wide() -> None:
+    """A fit sees an edge as far as the spot is wide, 8 mm: from 1 cm away or from nominal it never reached 2.9 mm."""
+    mount = EV3.colour_sensor
+    begun = initial_values("sensor_position", EV3, [], lambda tried: np.zeros((len(tried), 9)))
+    for ahead, left in ((0.0, -0.0029), (0.0025, 0.0), (-0.003, 0.003)):
+        apart = [np.hypot(s["ahead_m"] - mount.ahead - ahead, s["left_m"] - mount.left - left) for s in begun]
+        assert min(apart) < 0.001
+
+
 def test_a_bench_needs_no_camera() -> None:
     verdict = verdict_on("viscous_friction", "coefficient_nms", 0.004, rig="bench")
     assert "viscous_friction" in {verdict.effects[0].id, *verdict.effects[0].alternatives}

@@ -32,6 +32,7 @@ CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 PATCH_RADII_M = (0.07, 0.1, 0.15, 0.2, 0.3)
 SCANNED_RADIUS_M = 0.1
+MOUNTS_M = (-0.02, -0.01, -0.003, 0.0, 0.003, 0.01, 0.02)  # from nominal: an edge is 8 mm wide
 LEAST_GAIN = 2.0  # log-likelihood: of noise in a hundred cells; a name costs more
 PATCH_GRIPS = (0.06, 0.15, 0.3, 0.45, 0.65)
 SCANNED_GRIPS = (0.15, 0.3, 0.6)
@@ -272,8 +273,8 @@ def _currents(robot: Robot) -> Iterator[Values]:
 
 def _mounts(robot: Robot) -> Iterator[Values]:
     sensor = robot.colour_sensor
-    for ahead in (-0.02, -0.01, 0.0, 0.01, 0.02):
-        for left in (-0.02, -0.01, 0.0, 0.01, 0.02):
+    for ahead in MOUNTS_M:
+        for left in MOUNTS_M:
             yield {"ahead_m": max(sensor.ahead + ahead, 0.0), "left_m": sensor.left + left}
 
 
