@@ -380,11 +380,11 @@ def worth_a_name(
     """Return the share of each parameter's size in the catalogue that is material in these recordings, by field.
 
     It is 1 where all of it does not, and no less than what the simulation's own laws may be off by
-    (`Parameter.model_error_steps`).
+    (`Parameter.model_error_steps`). Of a ripple it is that of one wave a turn, which moves the robot most.
     """
     small, changed = [], []
     for effect in catalogue:
-        parameters, fields = free(robot, (effect,)), {p.field for p in _small(effect)}
+        parameters, fields = free(robot, (effect,)), {p.field for p in _sizes_of(effect)}
         sides = np.where(parameters.bounds[1] >= 1.0, 1.0, -1.0)
         for alone, c in zip(np.diag(sides), parameters.coordinates, strict=True):
             if c.parameter.field in fields:
@@ -432,9 +432,12 @@ def small_sensitivities(
 
 def _small(effect: str) -> list[Parameter]:
     """Return the parameters that may be off a little: derivatives at neutral say what that does."""
-    return (
-        [] if effect == RIPPLE else [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0 and p.smooth]
-    )
+    return [] if effect == RIPPLE else _sizes_of(effect)
+
+
+def _sizes_of(effect: str) -> list[Parameter]:
+    """Return the parameters whose sizes residuals follow smoothly, from neutral on."""
+    return [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0 and p.smooth]
 
 
 def scattered(offsets_s: Array) -> bool:
