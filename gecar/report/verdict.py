@@ -41,7 +41,9 @@ def sentences(verdict: Verdict) -> list[str]:
         )
         out.append(f"Visible, but too small to be named; possibly: {named}.")
     if verdict.found and not verdict.residual.material and not verdict.judgement.failed:
-        out.append(f"The remaining error {does(verdict.residual.size, verdict)}, which is not material.")
+        out.append(
+            f"The remaining error {does(verdict.residual.size, verdict)}, which is {_no_more(verdict)}."
+        )
     if verdict.residual.material or verdict.verdict.endswith("unexplained"):
         out.append(unexplained(verdict))
     if verdict.located:
@@ -111,7 +113,24 @@ def _nothing(verdict: Verdict) -> str:
     left = verdict.residual
     if left.white:
         return "Nothing is missing: the simulation matches these recordings to within the sensors' noise."
-    return f"Nothing material is missing: the remaining error {does(left.size, verdict)}."
+    size = does(left.size, verdict)
+    within = f", {_no_more(verdict)}" if _is_above_material(verdict) else ""
+    return f"Nothing material is missing: the remaining error {size}{within}."
+
+
+def _no_more(verdict: Verdict) -> str:
+    """Say why what is left asks for no further physics: it is small, or as little as known things are off by."""
+    if not _is_above_material(verdict):
+        return "not material"
+    laws = "the simulation's laws and " if verdict.found else ""
+    return f"no more than {laws}several small imperfections together may be off by"
+
+
+def _is_above_material(verdict: Verdict) -> bool:
+    """Whether what is left is above the smallest material size, but not above all that is allowed."""
+    if verdict.evidence is None:
+        return False
+    return bool(verdict.evidence.motion.problem.material.times(verdict.residual.size) > 1.0)
 
 
 def moves(size: Size, verdict: Verdict) -> str:

@@ -171,6 +171,15 @@ def test_a_headline_names_three_causes_at_most() -> None:
     assert first.count(",") == 3
 
 
+def test_more_than_is_material_is_not_said_to_be_immaterial() -> None:
+    verdict = verdict_on(*CASES["late"])
+    for mm, said in ((2.0, "which is not material"), (17.5, "several small imperfections together")):
+        size = replace(verdict.residual.size, mm_1m=mm, deg_1m=0.1)
+        left = replace(verdict, residual=replace(verdict.residual, size=size, material=False))
+        (sentence,) = (each for each in sentences(left) if each.startswith("The remaining error"))
+        assert said in sentence
+
+
 def test_errors_stand_in_units_beside_every_percentage() -> None:
     proof = sentences(verdict_on(*CASES["late"]))[1]
     assert "% of the gap is closed" in proof
