@@ -306,7 +306,7 @@ def _explained_without(
     """Explain motion without the encoders, or without the poses, where nothing explains those; None if that fails.
 
     One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
-    What was found may explain both: then no first effect was seen among all that two causes do together.
+    What was found may explain both: beside all that two causes do, either alone may make whole drives worse.
     """
     measured = {name for run in fitted.recordings for name in run.recording.measured}
     alone, beside = (residuals.without(instrument) for residuals in (fitted, held))

@@ -156,7 +156,7 @@ def _log_faults(split: Split, as_logged: Split) -> list[str]:
     if lost:
         gaps = "once" if lost == 1 else f"{lost} times"
         notes.append(
-            f"The logs miss rows, and {gaps} the command changed there. When it did was told by what the wheels did."
+            f"The logs miss rows, and {gaps} the command changed there. When it did was told by how the robot moved."
         )
     even = [run.name for run, was in zip(runs, logged, strict=True) if not np.array_equal(run.t_s, was.t_s)]
     if even:
