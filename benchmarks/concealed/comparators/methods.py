@@ -29,7 +29,7 @@ from gecar.reality.selection.acceptance import is_worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation, concluded
 from gecar.reality.selection.thresholds import MOST_EFFECTS
-from gecar.reality.uncertainty.intervals import NORMAL_95, deviations
+from gecar.reality.uncertainty.intervals import half_widths
 from gecar.reality.verdict import NextRecording
 from gecar.world.robot import load_robot
 
@@ -93,7 +93,7 @@ def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]
 def everything(problem: Problem) -> Explanation:
     """Fit all effects at once; name those of a size worth it whose 95 % interval leaves out neutral."""
     model = problem.estimator.fit(problem.catalogue, {}, ROUNDS)
-    sure = np.abs(model.z) > NORMAL_95 * deviations(problem.estimator, model)
+    sure = np.abs(model.z) > half_widths(problem.estimator, model)
     seen = {c.effect.id for c, told in zip(model.parameters.coordinates, sure, strict=True) if told}
     named = [e for e in problem.catalogue if e in seen and is_worthwhile(model, e)]
     steps = [Step(e, problem.known, model, problem.known.cost - model.cost) for e in named]
