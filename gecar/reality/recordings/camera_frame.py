@@ -52,6 +52,6 @@ def corrected(
     recording: Recording, mark: Sequence[float] | Array, course: Sequence[float] | Array
 ) -> Recording:
     """Return a recording whose poses are the axle's, in the course's frame."""
-    pose = np.column_stack([recording.x_m, recording.y_m, recording.heading_rad])
+    pose = recording.poses
     x, y, heading = course_pose(axle_pose(pose, mark), course).T
     return replace(recording, x_m=x, y_m=y, heading_rad=heading)

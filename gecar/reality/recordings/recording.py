@@ -99,6 +99,11 @@ class Recording(Displayed):
         """Commands held from row to row, shape (rows, 2): left and right; 0 for a motor not there."""
         return np.nan_to_num(np.column_stack([self.left_duty, self.right_duty]))
 
+    @property
+    def poses(self) -> Series:
+        """Where the camera saw the robot [m, m, rad], shape (rows, 3); NaN where it did not."""
+        return np.column_stack([self.x_m, self.y_m, self.heading_rad])
+
 
 @dataclass(frozen=True)
 class Case:

@@ -49,8 +49,7 @@ def without_log_faults(
         found = replayer_of(tried, sd, walk, memory_s).play(physics)
         errors = found.row_errors[:, [0, 1, 3]]
         if WHEELS.isdisjoint(tried.measured):
-            poses = np.column_stack([tried.x_m, tried.y_m, tried.heading_rad])
-            errors[~np.isnan(poses).all(axis=1)] = found.pose_errors
+            errors[~np.isnan(tried.poses).all(axis=1)] = found.pose_errors
         return np.asarray(np.minimum(np.nan_to_num(errors) ** 2, CLIP**2).sum(axis=1))
 
     if len(recording.t_s) < 3:

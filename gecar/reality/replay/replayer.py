@@ -227,7 +227,7 @@ def replayer_of(
     first = float(recording.t_s[0])
     zero = 0.0 if 0.0 < first <= LATEST_FIRST_ROW_S else first
     t, commands = recording.t_s - zero, recording.commands
-    pose = np.column_stack([recording.x_m, recording.y_m, recording.heading_rad])
+    pose = recording.poses
     posed = ~np.isnan(pose).all(axis=1)
     pose_t, pose = t[posed], pose[posed]
     r = recording
