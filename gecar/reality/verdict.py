@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gecar.displayed import Displayed
@@ -51,6 +51,10 @@ class Interval:
     low: float
     high: float
     unit: str
+
+    def reaching(self, *values: float) -> Interval:
+        """Return the interval made long enough to hold some values."""
+        return replace(self, low=min(self.low, *values), high=max(self.high, *values))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -131,7 +130,4 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
 
 def hulls(one: Mapping[str, Interval], named: Mapping[str, Interval]) -> dict[str, Interval]:
     """Return intervals that hold those of two fits of an effect, by label, with the values of the second."""
-    return {
-        label: replace(other, low=min(one[label].low, other.low), high=max(one[label].high, other.high))
-        for label, other in named.items()
-    }
+    return {label: other.reaching(one[label].low, one[label].high) for label, other in named.items()}

@@ -14,7 +14,6 @@ profile likelihood: practical non-identifiability).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -44,13 +43,10 @@ def along_valleys(problem: Problem, model: Model, spans: Spans) -> dict[str, dic
     half = half_widths(beside, joint)
     out = {effect: dict(of) for effect, of in spans.items()}
     for k, c in enumerate(joint.parameters.coordinates):
-        known = out[c.effect.id][c.parameter.label]
         ends = [
             c.value(float(np.clip(z, low[k], high[k]))) for z in (joint.z[k] - half[k], joint.z[k] + half[k])
         ]
-        out[c.effect.id][c.parameter.label] = replace(
-            known, low=min(known.low, *ends), high=max(known.high, *ends)
-        )
+        out[c.effect.id][c.parameter.label] = out[c.effect.id][c.parameter.label].reaching(*ends)
     return out
 
 
