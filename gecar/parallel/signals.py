@@ -40,7 +40,7 @@ def remember_interrupts() -> None:
 
 
 def _deletes(frame: FrameType | None) -> bool:
-    """Tell whether what runs is part of an object's deletion."""
+    """Whether a frame, or one that called it, is an object's `__del__`."""
     while frame is not None:
         if frame.f_code.co_name == "__del__":
             return True

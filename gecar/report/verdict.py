@@ -127,10 +127,9 @@ def _no_more(verdict: Verdict) -> str:
 
 
 def _is_above_material(verdict: Verdict) -> bool:
-    """Whether what is left is above the smallest material size, but not above all that is allowed."""
-    if verdict.evidence is None:
-        return False
-    return bool(verdict.evidence.motion.problem.material.times(verdict.residual.size) > 1.0)
+    """Whether what is left is more than the smallest material size."""
+    evidence = verdict.evidence
+    return evidence is not None and bool(evidence.motion.problem.material.times(verdict.residual.size) > 1.0)
 
 
 def moves(size: Size, verdict: Verdict) -> str:

@@ -436,7 +436,7 @@ def _small(effect: str) -> list[Parameter]:
 
 
 def _sizes_of(effect: str) -> list[Parameter]:
-    """Return the parameters whose sizes residuals follow smoothly, from neutral on."""
+    """Return an effect's sizes: the parameters that residuals follow smoothly from neutral on."""
     return [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0 and p.smooth]
 
 

@@ -175,9 +175,8 @@ def concluded(
 
 
 def resumed(problem: Problem, found: Explanation) -> Explanation:
-    """Return what effects that were found in a part of the residuals explain of all of them, each judged anew."""
-    effects = [step.effect for step in found.steps]
-    model = problem.under(problem.known, effects).estimator.fit(effects, found.taken.values)
+    """Explain all residuals by the effects that were found in a part of them, each judged beside the others."""
+    model = _fitted_anew(problem, found.taken, found.steps)
     steps = [beside_others(problem.under(model), model, step) for step in found.steps]
     model, kept = _swapped_and_dropped(problem, _Chain(tuple(steps), model, ()), ())
     return concluded(problem, model, kept, found.tried)
@@ -226,6 +225,7 @@ def _weakest_drifting(problem: Problem, model: Model, steps: Sequence[Step]) -> 
 
 
 def _fitted_anew(problem: Problem, model: Model, kept: Sequence[Step]) -> Model:
+    """Fit some effects to a problem from a model's values, under what the robot as it is known leaves."""
     effects = [step.effect for step in kept]
     return problem.under(problem.known, effects).estimator.fit(effects, model.values)
 
