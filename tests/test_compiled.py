@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,15 @@ def test_a_user_without_a_home_gets_a_private_cache(tmp_path: Path, monkeypatch:
     assert folder.is_dir()
     assert folder.is_relative_to(tmp_path)
     assert folder.parents[1].stat().st_mode & 0o077 == 0
+
+
+def test_what_no_later_process_would_find_in_the_cache_is_refused() -> None:
+    def doubled_by(factor: object) -> Callable[[float], float]:
+        def double(x: float) -> float:
+            return x if factor else 2.0 * x
+
+        return compiled.kernel(double)
+
+    with pytest.raises(TypeError, match="closes over the compiled factor"):
+        doubled_by(doubled_by(0))
+    assert doubled_by(0)(3.0) == 6.0

@@ -306,7 +306,6 @@ def _advance_one_with_terms(
     right: float,
     bench: bool,
     robots: npt.NDArray[Any],
-    alike: bool,  # noqa: ARG001 - of several
     stores: Array,
     flat: Array,
 ) -> None:
@@ -325,7 +324,6 @@ def _advance_one_with_terms(
 def _advance_several_with_terms(
     left: float,
     right: float,
-    bench: bool,  # noqa: ARG001 - there, robots with terms are replayed one by one
     robots: npt.NDArray[Any],
     alike: bool,
     stores: Array,
@@ -378,12 +376,11 @@ def _set_off_of_pose(flat: Array, lanes: int, robots: npt.NDArray[Any]) -> None:
         _store_pose(flat, lanes, lane, r)
 
 
-def _replay_kernel(lanes: int, terms: bool) -> Any:
+def _replay_kernel(lanes: int, terms: bool) -> Any:  # noqa: C901
     """Return the compiled replay of so many robots, that may have terms or have none.
 
     Plain robots have no replay of their own: few are among those that are fitted, and it took 20 s to compile.
     """
-    advance_with_terms = _advance_one_with_terms if lanes == 1 else _advance_several_with_terms
 
     def replay(
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
@@ -428,10 +425,12 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:
             left = _held(inputs.commands, inputs.command_t, _LEFT, at, begin, end, cap) * share
             right = _held(inputs.commands, inputs.command_t, _RIGHT, at, begin, end, cap) * share
             _remember_yaw(flat, lanes)
-            if acts:
-                advance_with_terms(left, right, inputs.bench, physics, alike, stores, flat)
-            else:
+            if not acts:
                 _advance(left, right, inputs.bench, flat, lanes)
+            elif lanes == 1:
+                _advance_one_with_terms(left, right, inputs.bench, physics, stores, flat)
+            else:
+                _advance_several_with_terms(left, right, physics, alike, stores, flat)
             n += 1
 
     return kernel(replay)

@@ -183,8 +183,8 @@ def enter_tile(
     return arrive(tile, passed, n * c.dt, floor, arrival)
 
 
-def _drive_kernel(terms: bool) -> Any:  # noqa: C901
-    """Return the compiled drive of robots with terms, or without; compiled when first called."""
+def _drive_on_kernel(terms: bool) -> Any:  # noqa: C901
+    """Return the compiled drive of robots with terms, or without, whose state ``s`` is the caller's."""
 
     def drive_on(
         program: npt.NDArray[np.int32], setup: Setup, s: Any, first: int, last: int, passed: int,
@@ -221,14 +221,24 @@ def _drive_kernel(terms: bool) -> Any:  # noqa: C901
             setup.energy[0] += s.voltage * battery_current(s, p) * c.dt
         return RUNNING, last, passed
 
-    on = kernel(drive_on)
+    return kernel(drive_on)
+
+
+_drive_on_without, _drive_on_with = _drive_on_kernel(terms=False), _drive_on_kernel(terms=True)
+
+
+def _drive_kernel(terms: bool) -> Any:
+    """Return the compiled drive of robots with terms, or without; compiled when first called."""
 
     def drive(
         program: npt.NDArray[np.int32], setup: Setup, first: int, last: int, passed: int,
         arrival: npt.NDArray[np.float64], trace: npt.NDArray[np.float64], every: int,
     ) -> tuple[int, int, int]:  # fmt: skip
         s = on_stack(setup.state[0])
-        result = on(program, setup, s, first, last, passed, arrival, trace, every)
+        if terms:
+            result = _drive_on_with(program, setup, s, first, last, passed, arrival, trace, every)
+        else:
+            result = _drive_on_without(program, setup, s, first, last, passed, arrival, trace, every)
         setup.state[0] = s
         return result
 
