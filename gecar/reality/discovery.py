@@ -48,7 +48,7 @@ from gecar.reality.residuals.compilation import compiled_replays
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of, stands_out, worsens
-from gecar.reality.selection.alternatives import alternatives
+from gecar.reality.selection.alternatives import alternatives, late_as_well
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, explain, resumed
@@ -487,10 +487,12 @@ def _findings(context: _Context, stages: Sequence[_Stage]) -> tuple[tuple[Found,
         for step in stage.explained.steps:
             others = alternatives(stage.explained, step)
             rivals += [known.with_effects({**beside, **model.values}) for model in others.values()]
+            late = late_as_well(stages[0].explained.problem, step)
+            rivals += [known.with_effects({**beside, **late})] if late else []
             gain, null = step.holdout_gain, step.null_95
             size = _sized(context, stage.explained.problem, stage.explained.taken, step)
             found.append(
-                Found(step.effect, tuple(others), stage.spans[step.effect], gain, null, step.p, size)
+                Found(step.effect, (*others, *late), stage.spans[step.effect], gain, null, step.p, size)
             )
     return tuple(found), tuple(rivals)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
+from gecar.reality.selection.alternatives import ON_THE_ROBOT, late_as_well
 from gecar.reality.selection.problem import Problem, problem_of, scattered
 from gecar.reality.selection.stepwise import explain
 from gecar.world.robot import Robot
@@ -50,6 +52,25 @@ def test_one_delay_common_to_all_is_no_scatter() -> None:
     assert not scattered(np.array([0.03, 0.03, 0.0305]))
     assert not scattered(np.array([0.03]))
     assert scattered(np.array([0.03, -0.03]))
+
+
+@pytest.mark.parametrize(
+    ("effect", "fitted", "wheels", "instead"),
+    [
+        ("sensor_delay", True, False, {"actuation_delay": {"time_s": 0.04}}),
+        ("sensor_lag", True, False, {}),
+        ("sensor_delay", False, False, {}),
+        ("sensor_delay", True, True, {}),
+    ],
+)
+def test_where_only_the_camera_tells_of_the_motion_a_late_sensor_may_be_late_commands(
+    effect: str, fitted: bool, wheels: bool, instead: dict[str, dict[str, float]]
+) -> None:
+    run = recorded(EV3, 0)
+    unlogged = {name: np.full(len(run.t_s), np.nan) for name in ON_THE_ROBOT}
+    motion = SimpleNamespace(recordings=[run if wheels else replace(run, **unlogged)], clocks_fitted=fitted)
+    step = SimpleNamespace(effect=effect, model=SimpleNamespace(values={effect: {"time_s": 0.04}}))
+    assert late_as_well(motion, step) == instead  # type: ignore[arg-type]
 
 
 def test_clocks_fitted_before_an_effect_was_known_are_fitted_anew_beside_it(

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gecar.reality.fitting.model import Model, Step
+from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.optimisation.least_squares import costs
 from gecar.reality.selection.acceptance import imitates_dry_friction, is_worthwhile
+from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
+
+LATE_SENSOR, LATE_MOTION = "sensor_delay", "actuation_delay"  # both have the parameter ``time_s``
+ON_THE_ROBOT = {
+    "left_angle_rad",
+    "right_angle_rad",
+    "yaw_rate_rad_s",
+}  # what tells of motion by the log's clock
 
 
 def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
@@ -29,3 +37,14 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
         if close and uncertain and is_worthwhile(swapped, other.effect, explained.problem.share):
             out[other.effect] = swapped
     return out
+
+
+def late_as_well(motion: Problem, step: Step) -> Effects:
+    """Return what a late colour sensor may be instead, where only the camera, by fitted clocks, tells of the motion.
+
+    All motion may be as late: then the clocks were fitted to be late by that, and the sensor seems late beside them.
+    """
+    measured = {name for run in motion.recordings for name in run.measured}
+    if step.effect != LATE_SENSOR or not motion.clocks_fitted or measured & ON_THE_ROBOT:
+        return {}
+    return {LATE_MOTION: dict(step.model.values[LATE_SENSOR])}
