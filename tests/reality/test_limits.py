@@ -55,3 +55,14 @@ def test_what_recordings_set_aside_do_not_show_must_show_in_two_others():
     quarter = np.arange(len(OWN)) < len(OWN) // 4
     assert limit_of({VISCOUS: OWN}, 0.0 * HELD) is not None
     assert limit_of({VISCOUS: OWN * quarter}, 0.0 * HELD) is None
+
+
+def test_what_one_recording_alone_may_show_must_show_in_two_of_its_thirds():
+    def limit(thirds):
+        one = len(OWN) // 4
+        problem = linear_problem(linear({}, {VISCOUS: np.repeat(thirds, one // 3) * OWN[:one]}, count=1))
+        under = problem.under(problem.known)
+        return limits(under, under.known, linear({}, {VISCOUS: 0.0 * HELD}, seed=5, count=2))[VISCOUS]
+
+    assert limit([1.0, 0.0, 1.0]) is not None
+    assert limit([0.0, 1.0, 0.0]) is None

@@ -369,21 +369,28 @@ def test_taking_an_effect_out_restores_the_known_robot_s_value() -> None:
 BLIND = replace(linear({}, RESPONSES, seed=5), responses={e: np.zeros_like(r) for e, r in RESPONSES.items()})
 
 
-def shown_in(recordings: list[float]) -> LinearResiduals:
-    """Return recordings in which an effect of 3 sizes shows, each by a share."""
-    fitted = linear({VISCOUS: 3.0}, RESPONSES)
-    shares = np.repeat(np.array(recordings), len(fitted.noise) // len(recordings))
-    return replace(fitted, responses={**RESPONSES, VISCOUS: shares * RESPONSES[VISCOUS]})
+def shown_in(parts: list[float], count: int = 4) -> LinearResiduals:
+    """Return recordings in which an effect of 3 sizes shows, in each part of them by a share."""
+    fitted = linear({VISCOUS: 3.0}, RESPONSES).part(range(count))
+    shares = np.repeat(np.array(parts), len(fitted.noise) // len(parts))
+    return replace(fitted, responses={**fitted.responses, VISCOUS: shares * fitted.responses[VISCOUS]})
 
 
 @pytest.mark.parametrize(
-    ("recordings", "kept"),
-    [([1.0, 1.0, 1.0, 1.0], True), ([1.0, 0.0, 1.0, 0.0], True), ([0.0, 0.0, 1.0, 0.0], False)],
+    ("count", "parts", "kept"),
+    [
+        (4, [1.0, 1.0, 1.0, 1.0], True),
+        (4, [1.0, 0.0, 1.0, 0.0], True),
+        (4, [0.0, 0.0, 1.0, 0.0], False),
+        (1, [1.0, 1.0, 1.0], True),
+        (1, [1.0, 0.0, 1.0], True),
+        (1, [0.0, 0.0, 1.0], False),
+    ],
 )
-def test_what_recordings_set_aside_do_not_show_is_confirmed_by_those_fitted_on(
-    recordings: list[float], kept: bool
+def test_what_recordings_set_aside_do_not_show_is_confirmed_by_those_fitted_on_or_thirds_of_the_only_one(
+    count: int, parts: list[float], kept: bool
 ) -> None:
-    explained = explain(linear_problem(shown_in(recordings)))
+    explained = explain(linear_problem(shown_in(parts, count)))
     assert [step.effect for step in explained.steps] == [VISCOUS]
     proof = confirmed(explained, BLIND)  # type: ignore[arg-type]
     assert proof.unseen == ((VISCOUS,) if kept else ())

@@ -67,9 +67,10 @@ def notes_on(
         f"{step.effect} explains the fitted recordings, but {_why_refused(step)}: a candidate, not a finding."
         for step in candidates
     ]
+    others, part = ("others", "of them") if len(split.fitted) > 1 else ("other one", "third of it")
     notes += [
-        f"The held-out recordings do not show {effect}. It was found on the others"
-        + ("." if BY_ID[effect].at_a_place else ", and each that shows it, left out, confirms it.")
+        f"The held-out recordings do not show {effect}. It was found on the {others}"
+        + ("." if BY_ID[effect].at_a_place else f", and each {part} that shows it, left out, confirms it.")
         for effect in unseen
     ]
     notes += _log_faults(split, as_logged or split)

@@ -16,6 +16,7 @@ from gecar.reality.prove.holdout import reading_error
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import most_uneven, worsens
+from gecar.reality.selection.cross_validation import refitted_errors
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import (
     LEAST_SHOWN,
@@ -144,13 +145,17 @@ def _asked_for(
 def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step, Share]:
     """Judge an effect on the fitted recordings that show it: each is left out in turn, and everything fitted again.
 
-    Two or more must show it; without the only one nothing is known of it: `UNSEEN`.
+    Two or more must show it; without the only one nothing is known of it: `UNSEEN`. If there is only one, its thirds
+    are left out.
     """
     problem, with_it = explained.problem, explained.taken
-    by_recording = np.bincount(problem.residuals.index.recording, _shown(explained, without))
-    shown = np.flatnonzero(by_recording >= LEAST_SHOWN)
+    shown = np.flatnonzero(np.bincount(problem.parts, _shown(explained, without)) >= LEAST_SHOWN)
     if len(shown) < 2:
         return step, UNSEEN
+    if len(problem.recordings) == 1:
+        here = problem.estimator
+        errors = [refitted_errors(here, here.at(model, model.z)) for model in (without, with_it)]
+        return _asked_for(step, here.residuals.index, errors[:1], errors[1])
     parts = []
     for k in shown:
         rest, alone = problem.without(int(k))

@@ -105,16 +105,32 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
 
 def _refitted_costs(estimator: Estimator, model: Model, effect: str) -> Array:
     """Return each fold's cost under parameters fitted to the others from where they are, shape (folds,)."""
+    errors = refitted_errors(estimator, model, _known_without(estimator, model, effect))
+    return np.bincount(estimator.blocks.folds, costs(errors)).astype(float)
+
+
+def refitted_errors(estimator: Estimator, model: Model, known: npt.NDArray[np.bool_] | None = None) -> Array:
+    """Return each residual under a model's parameters fitted again to the other folds, from where they are, shape (n,).
+
+    Parameters
+    ----------
+    estimator
+        Of the residuals.
+    model
+        Fitted to all of them.
+    known
+        Which coordinates are fitted without each fold, shape (folds, k); the others are neutral. Default: all.
+    """
     folds, residual = estimator.blocks.folds, estimator.residual(model.parameters)
-    known, (low, high) = _known_without(estimator, model, effect), model.parameters.bounds
-    probes = model.parameters.probes
-    out = np.zeros(len(known))
-    for k in np.unique(folds):
-        bounds = np.where(known[k], low, 0.0), np.where(known[k], high, 0.0)
+    low, high = model.parameters.bounds
+    errors = model.errors.copy()
+    for k in np.unique(folds) if len(model.z) else ():
+        free = np.ones(len(model.z), bool) if known is None else known[k]
+        bounds = np.where(free, low, 0.0), np.where(free, high, 0.0)
         others = _only(residual, folds != k)
-        found = least_squares(others, model.z, bounds, probes, REFITS, past_jumps=True)
-        out[k] = np.sum(costs(residual(found.z)[folds == k]))
-    return out
+        found = least_squares(others, model.z, bounds, model.parameters.probes, REFITS, past_jumps=True)
+        errors[folds == k] = residual(found.z)[folds == k]
+    return errors
 
 
 def _only(residual: Residual, kept: npt.NDArray[np.bool_]) -> Residual:

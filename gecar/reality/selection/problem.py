@@ -116,6 +116,12 @@ class Problem:
         """Return the cost of the residuals that a physics record, shape (1,), leaves."""
         return self.estimator.cost_of(self.residuals.errors(physics))
 
+    @property
+    def parts(self) -> npt.NDArray[np.int32]:
+        """Which part each residual is of that may confirm what others show: a recording, or a third of the only one."""
+        index = self.residuals.index
+        return index.recording if len(self.recordings) > 1 else self.estimator.blocks.folds
+
     def without(self, number: int) -> tuple[Problem, Residuals]:
         """Return the problem without one recording, and that recording's residuals."""
         numbers = [k for k in range(len(self.residuals.recordings)) if k != number]

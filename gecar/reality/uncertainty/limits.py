@@ -176,7 +176,8 @@ class _Search:
         """Return by which factor recordings set aside exceed what is needed to confirm an effect of one size.
 
         The share of it that they ask for is 1, give or take its standard deviation; with the small changes that make up
-        for it where it is absent, or without them. An effect that they do not show must show in two others.
+        for it where it is absent, or without them. An effect that they do not show must show in two others, or in two
+        thirds of the only other one.
         """
         problem, (held, before, noise) = self._problem, self._held
         if not held.recordings:
@@ -184,7 +185,7 @@ class _Search:
         after = held.errors(self._parameters.physics(z))
         least = least_share_expected(held.index, noise, after - before, SURE)
         if math.isinf(least):
-            shown = np.bincount(problem.residuals.index.recording, change**2) >= LEAST_SHOWN
+            shown = np.bincount(problem.parts, change**2) >= LEAST_SHOWN
             return math.inf if BY_ID[self._effect].at_a_place or np.sum(shown) > 1 else 0.0
         if least > 0.0:
             made_up = held.errors(problem.with_changes_for(self._model, -change))
