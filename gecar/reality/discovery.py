@@ -51,7 +51,7 @@ from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives, late_as_well
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, explain, resumed
+from gecar.reality.selection.stepwise import Explanation, explain, left_before, left_share, resumed
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, hulls, intervals
 from gecar.reality.uncertainty.limits import limits
@@ -397,10 +397,14 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
 def _is_left(stage: _Stage) -> bool:
     """Whether a law is worth looking for: what is left is material, or no change of constants could explain it.
 
-    In the second case effects may have stood in for most of a law, but not for all but a quarter of a material size.
+    In the second case effects may have stood in for most of a law, but not for all but a quarter of a material size,
+    nor for all but what their own laws are off by.
     """
-    beyond_constants = stage.explained.problem.is_beyond_constants and _left(stage) >= FOR_A_LAW
-    return stage.explained.unexplained or beyond_constants
+    explained = stage.explained
+    if explained.unexplained or not explained.problem.is_beyond_constants:
+        return explained.unexplained
+    share = _left(stage) / max(left_before(explained.problem), 1.0)
+    return _left(stage) >= FOR_A_LAW and share > left_share(explained.taken.effects)
 
 
 def _is_material(stage: _Stage) -> bool:
