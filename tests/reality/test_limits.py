@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from support.linear_case import bumps, linear, linear_problem
 
+from gecar.reality.uncertainty import limits as limits_of
 from gecar.reality.uncertainty.limits import limits
+from gecar.world.effects import BY_ID
 
 VISCOUS, DRY = "viscous_friction", "coulomb_friction"
 OWN, OTHER = 0.3 * bumps(1, 4, 1.0), 0.3 * bumps(2, 4, 1.0)
@@ -66,3 +68,12 @@ def test_what_one_recording_alone_may_show_must_show_in_two_of_its_thirds():
 
     assert limit([1.0, 0.0, 1.0]) is not None
     assert limit([0.0, 1.0, 0.0]) is None
+
+
+def test_an_effect_whose_law_may_be_off_has_a_larger_limit(monkeypatch):
+    """Its interval is that much longer, and must exclude neutral all the same."""
+    usual = limit_of({VISCOUS: 9.0 * OWN}, 9.0 * HELD).size
+    monkeypatch.setattr(limits_of, "model_error", lambda coordinate, z: 1.0)
+    off = limit_of({VISCOUS: 9.0 * OWN}, 9.0 * HELD).size
+    assert off / BY_ID[VISCOUS].parameters[0].worthwhile == pytest.approx(1.15 * (1.96 + 1.645), rel=0.03)
+    assert usual < 0.6 * off

@@ -11,6 +11,7 @@ from scipy.stats import t as student
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
 from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import Coordinate
 from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
@@ -57,6 +58,16 @@ def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
         return NORMAL_95 * np.sqrt(variances)
     jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
     return np.maximum(NORMAL_95 * np.sqrt(variances), student.ppf(0.975, folds - 1) * np.sqrt(jack))
+
+
+def model_error(c: Coordinate, z: float) -> float:
+    """Return the standard deviation of a coordinate that is fitted at ``z``, because the simulation is not reality.
+
+    It is half of what the parameter may be off by (`gecar.world.effects.Parameter`).
+    """
+    step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
+    # A parameter that acts by its ratio has its logarithm for a coordinate: a share of it is a difference there.
+    return 0.5 * (c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step)
 
 
 def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
@@ -110,16 +121,13 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
         zip(model.parameters.coordinates, half_widths(estimator, model), strict=True)
     ):
         z = float(model.z[k])
-        step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
-        # A parameter that acts by its ratio has its logarithm for a coordinate: a share of it is a difference there.
-        size = c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step
         if k in spans:
             down, up = spans[k]
         elif half > NORMAL_95 * FLAT or (abs(z) <= half and _is_one_of_several(model, k)):
             down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
         else:
             down = up = float(half)
-        reach = NORMAL_95 * 0.5 * size
+        reach = NORMAL_95 * model_error(c, z)
         edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
         ends = sorted(c.value(float(end)) for end in edges)
         out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(

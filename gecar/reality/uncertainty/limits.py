@@ -6,6 +6,7 @@ times its root. The limit is the size, worth a name and material, at which in 95
 
 - that passes the price of a name,
 - it gains more than any other effect would in its place,
+- its interval excludes neutral, though the simulation's own law for it is a little off,
 - the recordings set aside confirm it beside the small changes that make up for it in those fitted on.
 
 A patch's limit holds for nine of ten places where the robot has been.
@@ -34,6 +35,7 @@ from gecar.reality.selection.acceptance import worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import LEAST_SHOWN, least_share_expected
 from gecar.reality.selection.thresholds import PRICE
+from gecar.reality.uncertainty.intervals import NORMAL_95, model_error
 from gecar.reality.verdict import Limit
 from gecar.world.effects import BY_ID
 
@@ -144,7 +146,7 @@ class _Search:
         for n, (margin, change) in enumerate(self._tried(vectors)):
             z = vectors[n]
             matters = margin >= 1.0 and self._matters(z)
-            now = min(margin, self._confirmed(z, change)) if matters else margin
+            now = min(margin, self._apart_from_neutral(z), self._confirmed(z, change)) if matters else margin
             if matters and now >= 1.0:
                 found = z[k] if n == 0 or before >= 1.0 else _between(sizes[n - 1 : n + 1], before, now)
                 return float(np.clip(MARGIN * found, low, high))
@@ -171,6 +173,12 @@ class _Search:
             np.clip(1.0 - np.max(alike, axis=0, initial=0.0) / np.maximum(squares, FAINT), 0.0, 1.0)
         )
         return np.asarray(np.minimum(shown / NEEDED, own * shown / APART))
+
+    def _apart_from_neutral(self, z: Array) -> float:
+        """Return by which factor a size exceeds what it needs: its law may be off, and its interval allows for that."""
+        size = float(z[self._k])
+        off = model_error(self._parameters.coordinates[self._k], size)
+        return abs(size) / max((NORMAL_95 + SURE) * off, FAINT)
 
     def _confirmed(self, z: Array, change: Array) -> float:
         """Return by which factor recordings set aside exceed what is needed to confirm an effect of one size.
