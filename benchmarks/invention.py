@@ -95,6 +95,12 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coasting": (_MOTOR, ("command", "speed")),
     "swinging_sensor": (("sensor_ahead", "sensor_aside"), ("ahead", "turn_rate")),
     "swivel_caster": (("force_aside", "yaw_moment"), ("turn_rate", "ahead", "aside")),
+    "frame_count": (("pose_late", "pose_x", "pose_y", "pose_heading"), ("time",)),
+    "keystone": (("pose_toward", "pose_x", "pose_y"), ("x", "y", "distance")),
+    "frame_rub": (_MOTOR, ("turn_rate",)),
+    "lossy_gears": (_MOTOR, ("current",)),
+    "grooved_floor": (("caster_friction", *_FORCE, "force_ahead", "yaw_moment"), ("heading",)),
+    "slow_sag": (("supply_voltage",), ("store",)),
 }
 NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""

@@ -150,6 +150,7 @@ PORTS: tuple[Port, ...] = (
     Port("sensor_aside", "m", "a shift of the colour sensor to the left", False, 0.02, _SEEN, "colour"),
     Port("pose_turn", "rad", "a turn of the camera's picture", False, 0.05,
          (*_SEEN, "distance"), "camera"),
+    Port("pose_late", "s", "how late the camera's poses are", False, 0.05, _SEEN, "camera"),
 )  # fmt: skip
 PORT_NUMBER = {port.id: number for number, port in enumerate(PORTS)}
 AT_A_POINT = ("force_toward", "pose_toward", "pose_turn")

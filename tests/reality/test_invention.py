@@ -643,6 +643,7 @@ def test_sums_are_taken_apart_and_put_together():
         ({"port": "pose_y", "law": "c1 * ahead * sin(heading)", "c1": -0.04}, "a camera that is late, by about 40 ms"),
         ({"port": "pose_turn", "law": "c1 * time", "c1": 0.01, "at_x": 1.2, "at_y": 0.6},
          "a camera that turns slowly"),
+        ({"port": "pose_late", "law": "c1 * time", "c1": 0.009}, "a camera whose clock runs slow"),
         ({"port": "caster_friction", "law": "c1", "c1": 0.04}, "a caster that drags"),
         ({"port": "command", "law": "c1", "c1": -0.006}, "motors that drive less forward and more backward"),
         ({"port": "colour_reading", "law": "c1 * reading * cos(heading)", "c1": 0.1}, "light that comes from one side"),

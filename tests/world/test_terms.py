@@ -180,6 +180,17 @@ def test_a_camera_that_turns_turns_all_that_it_sees_about_a_point():
     assert np.array_equal(seen.rows, plain.rows)
 
 
+def test_a_camera_that_is_late_shows_poses_of_a_moment_ago():
+    plain, seen = (
+        replayer_of(RECORDING).play(robot.physics) for robot in (NOMINAL, law("pose_late", "a", a=0.005))
+    )
+    t = RECORDING.t_s[np.flatnonzero(~np.isnan(RECORDING.x_m))]
+    expected, found = -0.005 * np.gradient(plain.poses, t, axis=0), seen.poses - plain.poses
+    assert np.median(np.abs(found - expected)) < 1e-5
+    assert np.all(np.abs(found - expected)[1:].max(axis=0) < 0.1 * np.abs(expected).max(axis=0))
+    assert np.array_equal(seen.rows, plain.rows)
+
+
 def test_a_lens_moves_poses_along_the_line_to_its_middle():
     bent = law("pose_toward", "a * distance ** 2", a=-0.2, at_x=0.3, at_y=-0.1)
     plain, seen = (replayer_of(RECORDING).play(robot.physics) for robot in (NOMINAL, bent))

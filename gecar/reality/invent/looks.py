@@ -80,6 +80,8 @@ _KNOWN = (
     _Known(("sensor_ahead", "sensor_aside"), r"(cos|sin)\(heading\)", "a line that lies elsewhere",
            "a line that lies elsewhere"),
     _Known(("pose_turn",), r"time", "a camera that turns slowly", "a camera that turns slowly"),
+    _Known(("pose_late",), r"1", "a camera that is early", "a camera that is late"),
+    _Known(("pose_late",), r"time", "a camera whose clock runs fast", "a camera whose clock runs slow"),
     _Known(("force_x",), r"1", "a pull toward -x: a floor that is not level",
            "a pull toward +x: a floor that is not level"),
     _Known(("force_y",), r"1", "a pull toward -y: a floor that is not level",

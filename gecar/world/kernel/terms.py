@@ -51,6 +51,7 @@ Array = npt.NDArray[np.float64]
 _APART = 0.01  # rad, over which a radius's growth with the wheel's angle is measured
 _ANGLE, _LOAD, _X, _Y = (VARIABLE[name] for name in ("angle", "load", "x", "y"))
 _DISTANCE, _STORE = VARIABLE["distance"], VARIABLE["store"]
+_AHEAD, _ASIDE, _TURN_RATE, _HEADING = (VARIABLE[name] for name in ("ahead", "aside", "turn_rate", "heading"))
 
 PORT_ENCODER, PORT_GYRO, PORT_POSE_X, _COLOUR, _SENSOR_AHEAD, _SENSOR_ASIDE = (
     any_integer(PORT_NUMBER[name])
@@ -67,6 +68,7 @@ _LAW, _STORE_LAW, _ONE, _FIRST = (any_integer(number) for number in (LAW, STORE_
 WHOLE = any_integer(0)
 """Hand of a reading that neither wheel has for itself."""
 _TOWARD, _POSE_TOWARD, _POSE_TURN = (PORT_NUMBER[name] for name in AT_A_POINT)
+_POSE_LATE = PORT_NUMBER["pose_late"]
 _RADIUS, _PLAY, _TRACK = (PORT_NUMBER[name] for name in ("rolling_radius", "gear_play", "track_width"))
 _ASKED_AT = np.array([ASKED_FIELDS.index(names[0]) for names in ASKED_OF_PORT])
 _OF_WHEEL = np.array([port.of_wheel for port in OF_BODY])
@@ -341,7 +343,18 @@ def _reading_error(port: int, hand: int, v: Any, laws: Any) -> float:
             total += _toward(laws, k, seen)[axis]
         elif acts_at == _POSE_TURN and 0 <= axis < 3:
             total += _turned(laws, k, seen)[axis]
+        elif acts_at == _POSE_LATE and 0 <= axis < 3:
+            late = law(laws, k, _LAW, int(laws.terms[k, LENGTH]), seen, _ONE, _FIRST, MEAN)
+            total -= late * _pose_rates(seen)[axis]
     return total
+
+
+@kernel
+def _pose_rates(seen: Array) -> tuple[float, float, float]:
+    """Return how fast a pose changes: x, y [m/s] and heading [rad/s]."""
+    ahead, aside = seen[2 * _AHEAD], seen[2 * _ASIDE]
+    sine, cosine = math.sin(seen[2 * _HEADING]), math.cos(seen[2 * _HEADING])
+    return ahead * cosine - aside * sine, ahead * sine + aside * cosine, seen[2 * _TURN_RATE]
 
 
 @kernel
