@@ -12,11 +12,8 @@ from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
 
 LATE_SENSOR, LATE_MOTION = "sensor_delay", "actuation_delay"  # both have the parameter ``time_s``
-ON_THE_ROBOT = {
-    "left_angle_rad",
-    "right_angle_rad",
-    "yaw_rate_rad_s",
-}  # what tells of motion by the log's clock
+# What tells of the motion by the log's clock.
+ON_THE_ROBOT = {"left_angle_rad", "right_angle_rad", "yaw_rate_rad_s"}
 
 
 def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
