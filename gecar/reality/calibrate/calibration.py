@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from gecar.reality.calibrate.constant_fit import fitted
 from gecar.reality.calibrate.constants import MARK, Constant, FreeConstants, chosen, with_constants
@@ -260,7 +260,7 @@ def _half_width(errors: Array, slopes: Array, groups: npt.NDArray[np.int64]) -> 
         leaps.append(np.linalg.pinv(part, hermitian=True) @ (slopes[rows].T @ errors[rows]))
     count = len(leaps)
     variance = (count - 1) / count * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    return np.asarray(student.ppf(0.975, count - 1) * np.sqrt(variance))
+    return np.asarray(stdtrit(count - 1, 0.975) * np.sqrt(variance))
 
 
 def _groupings(residuals: Residuals) -> list[npt.NDArray[np.int64]]:

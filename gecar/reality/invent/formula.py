@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from gecar.reality.replay.kernel import (
     AHEAD,
@@ -213,6 +212,8 @@ def _signals(run: RecordingResiduals, physics: npt.NDArray[Any]) -> list[_Signal
 
 def _signal(t: Array, terms: Array, at: Array, residual: Array, sd: float, memory: float) -> _Signal:
     """Return residuals, and terms added up with the replay's memory, on an even grid whatever the rows."""
+    from scipy.signal import lfilter  # noqa: PLC0415  a quarter of a second of a command's start
+
     seen = ~np.isnan(residual)
     if seen.sum() < FEWEST_SAMPLES:
         return _Signal(np.zeros(0), np.zeros((0, len(NAMES))))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from gecar.reality.replay.kernel import (
     AHEAD,
@@ -62,6 +61,8 @@ def states(run: RecordingResiduals, physics: Physics, term: Term) -> dict[str, A
 
 
 def _filled(term: Term, found: Mapping[str, Array], t: Array) -> Array:
+    from scipy.signal import lfilter  # noqa: PLC0415  a quarter of a second of a command's start
+
     if not term.store:
         return np.zeros((len(t), 2))
     filling = Term(**{**term.as_table(), "law": term.store, "side": "both"})

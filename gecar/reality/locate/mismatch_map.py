@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
 from gecar.reality.locate.shift_test import DRAWS, best_disc, regime_p
@@ -199,7 +199,7 @@ class MismatchMap:
     def _throughout(self, channel: int) -> Place:
         """Return the entry of a channel that is off whatever the motion: the last resort."""
         count = self.samples[channel].sum()
-        p = max(float(norm.sf(self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + DRAWS))
+        p = max(float(ndtr(-self.energy[channel].sum() / np.sqrt(2.0 * count))), 1.0 / (1 + DRAWS))
         strong, spans = self._spans(channel)
         name = self.runs[strong].recording.name
         if self.spot is None:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from gecar.reality.fitting.gain_offset import EFFECT as GAIN
 from gecar.reality.fitting.gain_offset import on_even_floor
@@ -123,7 +123,7 @@ def heterogeneity(groups: Groups, without: Array, with_effect: Array) -> Heterog
     mean = np.average(shares, weights=information)
     q, freedom = float(information @ (shares - mean) ** 2), len(shares) - 1
     of_all = float(information.sum() - information @ information / information.sum())
-    return Heterogeneity(float(np.sqrt(max(q - freedom, 0.0) / of_all)), float(chi2.sf(q, freedom)))
+    return Heterogeneity(float(np.sqrt(max(q - freedom, 0.0) / of_all)), float(chdtrc(freedom, q)))
 
 
 def _splits(problem: Problem, model: Model) -> Iterator[Groups]:

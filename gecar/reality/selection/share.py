@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import curvatures, weights
@@ -107,7 +107,7 @@ def _uncertainty(index: ResidualIndex, errors: Array, change: Array) -> tuple[fl
     """Return a share's standard deviation, and how far its one-sided bounds are from it."""
     variance, spans = _variance_of_sum(index, weights(errors) * errors * change)
     deviation = float(np.sqrt(variance) / np.sum(curvatures(errors) * change * change))
-    return deviation, float(student.ppf(1.0 - SIGNIFICANCE, max(spans - 1.0, 1.0)) * deviation)
+    return deviation, float(stdtrit(max(spans - 1.0, 1.0), 1.0 - SIGNIFICANCE) * deviation)
 
 
 def spread_of_size(folds: npt.NDArray[np.int32], without: Array, with_effect: Array) -> float:

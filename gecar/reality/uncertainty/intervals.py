@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
@@ -57,7 +57,7 @@ def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
     if folds < 2:
         return NORMAL_95 * np.sqrt(variances)
     jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    return np.maximum(NORMAL_95 * np.sqrt(variances), student.ppf(0.975, folds - 1) * np.sqrt(jack))
+    return np.maximum(NORMAL_95 * np.sqrt(variances), stdtrit(folds - 1, 0.975) * np.sqrt(jack))
 
 
 def model_error(c: Coordinate, z: float) -> float:
