@@ -101,6 +101,7 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "lossy_gears": (_MOTOR, ("current",)),
     "grooved_floor": (("caster_friction", *_FORCE, "force_ahead", "yaw_moment"), ("heading",)),
     "slow_sag": (("supply_voltage",), ("store",)),
+    "position_hold": (("command", "motor_torque"), ("angle",)),
 }
 NO_LAW = ("gusts", "radio_dropouts", "flicker", "camera_bump")
 """Noise by nature, or a thing that happened once: nothing is to be invented."""

@@ -101,7 +101,18 @@ _KNOWN = (
 
 def looks_like(term: Term) -> str:
     """Return what a law looks like: its name where it is a known one, or else what it adds and on what that depends."""
-    for say in (_spring, _lens, _once_per_turn, _late, _ramped, _paused, _wound_up, _stored, _named):
+    for say in (
+        _spring,
+        _lens,
+        _once_per_turn,
+        _late,
+        _ramped,
+        _paused,
+        _holding,
+        _wound_up,
+        _stored,
+        _named,
+    ):
         words = say(term)
         if words:
             return words + _where(term)
@@ -205,6 +216,13 @@ def _paused(term: Term) -> str:
         return ""
     pause_s = -found[1] * math.log(2.0) * term.store_s  # 1 - 2 exp(-t / store_s) changes its sign
     return f"a pause of about {1e3 * pause_s:.0f} ms before a motor turns round" if pause_s > 0.0 else ""
+
+
+def _holding(term: Term) -> str:
+    """Name motors that a firmware turns back at duty 0: a store follows the shaft while a motor is driven."""
+    follows = re.fullmatch(r"store \+ \(angle - store\) \* positive\(abs\(command\) - \w+\)", term.store)
+    held = re.fullmatch(r"\w+ \* \(store - angle\) \* positive\(\w+ - abs\(command\)\)", term.law)
+    return "motors that hold the angle at which they were stopped" if follows and held else ""
 
 
 def _wound_up(term: Term) -> str:
