@@ -201,6 +201,9 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     invented = tuple(law for stage in stages for law in stage.invented)
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), unexplained)
+    unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
+    shows = len(unseen) < len(effects) or any(law.holdout_gain != 0.0 for law in invented)
+    shows |= not (effects or invented)
     where = _located(context, stages, fitted, found)
     seen_from = _limits(context, stages)
     return Verdict(
@@ -210,7 +213,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         minor=tuple(each for each in small if context.material.times(each.size) > NEGLIGIBLE),
         invented=invented,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
-        judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after)),
+        judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after), shows),
         residual=_what_is_left(context, stages, fitted, after),
         next_recording=suggest(
             found,
@@ -236,7 +239,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             if motion.explained.problem.on_bench
             else (),
             motion.left_out,
-            [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen],
+            unseen,
+            invented,
             context.split,
             found,
         ),

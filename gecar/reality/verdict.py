@@ -13,6 +13,7 @@ from gecar.world.robot import Robot
 from gecar.world.terms import Term
 
 MOST_NAMED = 8  # recordings
+WORSE = 1.05  # times what it was off by before: a channel that was made worse
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
 
@@ -37,6 +38,11 @@ class Misfit:
     def gaps(self) -> tuple[float, float]:
         """How far before and after are above the floor, in units of it."""
         return self.before / self.floor - 1.0, self.after / self.floor - 1.0
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether it was made worse."""
+        return self.after > WORSE * self.before
 
     def as_json(self) -> dict[str, float]:
         """Return the three figures as they are written."""
@@ -101,7 +107,8 @@ class Invented:
     looks_like
         In words.
     holdout_gain, left_out_gain
-        What it lowers the cost by on the recordings set aside, and on those fitted to, each left out in turn.
+        What it lowers the cost by on the recordings set aside, 0 if they do not show it, and on those fitted to, each
+        left out in turn.
     null_95, p
         95 % quantile of the largest gain of any law that was tried, without a cause; share of nulls that gain as much.
     spread
@@ -188,6 +195,8 @@ class Judgement:
     recordings: tuple[str, ...]
     by_time: bool
     channels: Mapping[str, Misfit]
+    shows: bool = True
+    """Whether these recordings show anything of what was found; if not, those fitted on have confirmed it."""
 
     @property
     def named(self) -> str:
@@ -225,7 +234,8 @@ class Judgement:
     @property
     def failed(self) -> bool:
         """Whether the robot found is further off than the robot as it was: the proof fails."""
-        return (self.gap_closed or 0.0) < 0.0
+        worse = (self.gap_closed or 0.0) < 0.0 and any(m.is_worse for m in self.channels.values())
+        return worse and self.shows
 
 
 @dataclass(frozen=True)

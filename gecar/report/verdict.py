@@ -20,7 +20,6 @@ _CHANNELS = {column: column.rsplit("_", 1)[0] for column in COLUMNS}
 _UNITS = {"m": (1e3, "mm"), "deg": (1.0, "deg"), "dps": (1.0, "deg/s"), "v": (1.0, "V"), "pct": (1.0, "%")}
 FAILS = "The test fails: on held-out recordings the error is larger with what was found than without it."
 MOST_NAMED = 3  # causes in a headline; the list has all
-_WORSE = 1.05  # times what it was off by before: a channel that was made worse
 
 
 def words(verdict: Verdict) -> list[str]:
@@ -68,7 +67,7 @@ def failure(verdict: Verdict) -> str:
     worse = [
         _was_now(verdict, column, misfit, short=True)
         for column, misfit in verdict.judgement.channels.items()
-        if misfit.after > _WORSE * misfit.before
+        if misfit.is_worse
     ]
     return f"Errors on {set_aside(verdict)}, root mean square, with what was found and without: {', '.join(worse)}."
 
@@ -215,6 +214,8 @@ def _proof(verdict: Verdict) -> str:
         if max(m.before, m.after) > VISIBLE * m.floor
     }
     where = set_aside(verdict)
+    if not verdict.judgement.shows:
+        return f"What was found does not show in {where}; parts of the others, left out in turn, confirm it."
     if not gaps:
         return f"Judged on {where}, where every channel shows only noise."
     closed = verdict.judgement.gap_closed
@@ -234,7 +235,7 @@ def _was_now(verdict: Verdict, column: str, misfit: Misfit, short: bool = False)
     if column.endswith("angle_deg") and not math.isnan(misfit.deviation):
         mm = math.radians(misfit.deviation) * 1e3 * verdict.robot.body.wheel_radius
         rolled = f", rolled {amount(mm * misfit.before, 'mm')} → {amount(mm * misfit.after, 'mm')}"
-    worse = ", worse" if misfit.after > _WORSE * misfit.before else ""
+    worse = ", worse" if misfit.is_worse else ""
     return f"{name} off by {was} → {now}{rolled}{worse} (noise alone {noise})"
 
 

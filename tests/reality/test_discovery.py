@@ -73,6 +73,15 @@ def test_the_gap_closed_counts_channels_made_worse_and_not_those_that_show_noise
     assert judged.gap_closed == pytest.approx((8.0 - 0.75) / (9.0 + 0.5))
 
 
+@pytest.mark.parametrize(
+    ("after", "shows", "failed"), [(1.2, True, True), (1.02, True, False), (1.2, False, False)]
+)
+def test_a_test_fails_where_recordings_show_what_was_found_and_a_channel_is_made_worse(
+    after: float, shows: bool, failed: bool
+) -> None:
+    assert Judgement(("run_07",), False, {"x_m": Misfit(1.0, after, 0.1)}, shows).failed == failed
+
+
 def test_what_a_missing_effect_leaves_on_a_bench_is_not_white() -> None:
     evidence = verdict_on("viscous_friction", "coefficient_nms", 0.004, rig="bench").evidence
     assert not whiteness(evidence.motion.problem, evidence.motion.problem.known)[0]

@@ -346,6 +346,15 @@ def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkey
     assert with_oval_wheels(0.02).invented == ()
 
 
+def test_of_a_law_that_recordings_set_aside_do_not_show_the_others_decide(monkeypatch):
+    assert with_oval_wheels(0.03).invented[0].holdout_gain > 100.0
+    monkeypatch.setattr(invention, "LEAST_SHOWN", np.inf)
+    verdict = with_oval_wheels(0.03)
+    assert [law.holdout_gain for law in verdict.invented] == [0.0]
+    assert any("do not show the law at rolling_radius" in note for note in verdict.notes)
+    assert sentences(verdict)[1].startswith("What was found does not show in ")
+
+
 def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(monkeypatch):
     monkeypatch.setattr(discovery, "_is_left", lambda _: True)
     assert with_oval_wheels(0.004).verdict == "nothing"
@@ -635,6 +644,9 @@ def test_sums_are_taken_apart_and_put_together():
           "store": "sign(command)", "store_s": 0.04}, "a pause of about 28 ms before a motor turns round"),
         ({"port": "motor_torque", "law": "c1 * tanh((speed - other_speed) / k2)", "c1": -0.01, "k2": 0.3},
          "axles that rub on each other"),
+        ({"port": "command", "law": "c1 * (store - angle) * positive(k1 - abs(command))", "c1": 0.06, "k1": 0.005,
+          "store": "store + (angle - store) * positive(abs(command) - k2)", "k2": 0.005},
+         "motors that hold the angle at which they were stopped"),
         ({"port": "yaw_moment", "law": "c1 * store", "c1": -3e-3, "store": "store + turn_rate"},
          "a cable that winds up as the robot turns"),
         ({"port": "gear_play", "law": "c1 * time", "c1": 0.01, "side": "right"},

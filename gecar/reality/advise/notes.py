@@ -11,6 +11,7 @@ from gecar.reality.fitting.model import Step
 from gecar.reality.recordings.split import ENOUGH_S, Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.verdict import Invented
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
@@ -34,6 +35,7 @@ def notes_on(
     alike: Sequence[Sequence[str]] = (),
     left_out: str = "",
     unseen: Sequence[str] = (),
+    invented: Sequence[Invented] = (),
     as_logged: Split | None = None,
     found: Robot | None = None,
 ) -> tuple[str, ...]:
@@ -58,6 +60,8 @@ def notes_on(
         Encoders or poses, where nothing explains those, so that they were left out.
     unseen
         Effects found that the recordings set aside do not show.
+    invented
+        Laws found.
     as_logged
         The same recordings with the faults of their logs.
     found
@@ -72,6 +76,12 @@ def notes_on(
         f"The held-out recordings do not show {effect}. It was found on the {others}"
         + ("." if BY_ID[effect].at_a_place else f", and each {part} that shows it, left out, confirms it.")
         for effect in unseen
+    ]
+    notes += [
+        f"The held-out recordings do not show the law at {law.term.port}. It was found on the {others}; parts of these,"
+        " left out, confirm it."
+        for law in invented
+        if split.held and law.holdout_gain == 0.0
     ]
     notes += _log_faults(split, as_logged or split)
     notes += battery_at_its_end(found) if found else []

@@ -30,7 +30,7 @@ from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.homogeneity import flickers
 from gecar.reality.selection.problem import Problem
-from gecar.reality.selection.share import share_asked_for, spread_of_size
+from gecar.reality.selection.share import LEAST_SHOWN, share_asked_for, spread_of_size
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE
 from gecar.reality.verdict import Invented
@@ -232,10 +232,13 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     They must ask for it beside no other change of the robot, or beside those small ones that either asks for: far from
     what was fitted these may do more harm than good. Whole drives, open loop, are judged as the verdict is; they must
     come out much better, unless all of the law is asked for: then something else may send them farther astray.
+    Recordings that do not show the law say nothing of it, a gain of 0: those fitted on, left out, have confirmed it.
     """
     if not held.recordings:
         return 0.0
     plain = [held.errors(e.taken.physics) for e in (before, after)]
+    if np.sum((plain[0] - plain[1]) ** 2) < LEAST_SHOWN:
+        return 0.0
     beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
     shares = [(share_asked_for(held.index, *errors), errors) for errors in (plain, beside)]
     share, (without, having) = max(shares, key=lambda each: each[0].margin)
