@@ -8,7 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import FrameType
+from types import FrameType, TracebackType
 
 A_MOMENT = 0.01  # s; a deletion takes microseconds
 
@@ -90,6 +90,26 @@ def start_worker() -> None:
     """Prepare a worker process: Ctrl-C is its parent's business, and it ends when its parent does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def end_late_workers_quietly() -> None:
+    """Let a worker that is forked after its run was stopped end without a word: the run's locks are gone by then.
+
+    To be called in the fork server, which prints what a worker raises before it works; later errors go to the parent.
+    """
+    from multiprocessing import synchronize  # noqa: PLC0415  every command imports this module first
+
+    usual = sys.excepthook
+
+    def say(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        innermost = trace
+        while innermost is not None and innermost.tb_next is not None:
+            innermost = innermost.tb_next
+        at = innermost.tb_frame.f_code.co_filename if innermost is not None else ""
+        if not (kind is FileNotFoundError and at == synchronize.__file__):
+            usual(kind, error, trace)
+
+    sys.excepthook = say
 
 
 def _end_with_parent() -> None:

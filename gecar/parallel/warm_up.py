@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import threading
 
+from gecar.parallel.signals import end_late_workers_quietly
+
 _LOOK_EVERY_S = 0.2
 
 
@@ -28,6 +30,7 @@ def _end_with(parent: int, loaded: threading.Event) -> None:
             os._exit(1)
 
 
+end_late_workers_quietly()
 _loaded = threading.Event()
 _watch = threading.Thread(target=_end_with, args=(os.getppid(), _loaded), daemon=True)
 _watch.start()

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import random
 import shutil
 import signal
 import subprocess
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from test_results import SHORT, outputs
 
 from gecar.errors import InputError
-from gecar.parallel.signals import interrupts_told, raise_if_interrupted, remember_interrupts
+from gecar.parallel.signals import (
+    end_late_workers_quietly,
+    interrupts_told,
+    raise_if_interrupted,
+    remember_interrupts,
+)
 from gecar.results.config import configure
 from gecar.results.run import finish, resume, start
 
@@ -181,3 +189,21 @@ def test_an_interrupt_in_a_deletion_comes_a_moment_later(capfd: pytest.CaptureFi
         signal.signal(signal.SIGINT, before)
         signal.signal(signal.SIGALRM, alarm)
     assert capfd.readouterr().err == ""
+
+
+def test_a_worker_that_comes_after_its_run_was_stopped_ends_without_a_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its run's locks are gone, which the fork server would print; what else is wrong is printed."""
+    monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+    end_late_workers_quietly()
+
+    def printed(broken: Callable[[], object]) -> str:
+        with pytest.raises(FileNotFoundError) as caught:
+            broken()
+        sys.excepthook(FileNotFoundError, caught.value, caught.tb)
+        return capsys.readouterr().err
+
+    lock: Any = multiprocessing.get_context("spawn").Lock()
+    assert not printed(lambda: lock.__setstate__((0, 1, 1, "/gone")))
+    assert "FileNotFoundError" in printed(lambda: Path("gone").read_text(encoding="utf-8"))
