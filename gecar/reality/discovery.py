@@ -202,8 +202,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), unexplained)
     unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
-    shows = len(unseen) < len(effects) or any(law.holdout_gain != 0.0 for law in invented)
-    shows |= not (effects or invented)
+    nothing = not (effects or invented)
+    shows = nothing or len(unseen) < len(effects) or any(law.holdout_gain != 0.0 for law in invented)
     where = _located(context, stages, fitted, found)
     seen_from = _limits(context, stages)
     return Verdict(

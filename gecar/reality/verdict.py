@@ -196,7 +196,7 @@ class Judgement:
     by_time: bool
     channels: Mapping[str, Misfit]
     shows: bool = True
-    """Whether these recordings show anything of what was found; if not, those fitted on have confirmed it."""
+    """Whether these recordings show anything of what was found."""
 
     @property
     def named(self) -> str:

@@ -215,7 +215,7 @@ def _proof(verdict: Verdict) -> str:
     }
     where = set_aside(verdict)
     if not verdict.judgement.shows:
-        return f"What was found does not show in {where}; parts of the others, left out in turn, confirm it."
+        return f"What was found does not show in {where}."
     if not gaps:
         return f"Judged on {where}, where every channel shows only noise."
     closed = verdict.judgement.gap_closed

@@ -118,7 +118,7 @@ class Problem:
 
     @property
     def parts(self) -> npt.NDArray[np.int32]:
-        """Which part each residual is of that may confirm what others show: a recording, or a third of the only one."""
+        """The recording of each residual, or its third of the only one, shape (n,): parts confirm what others show."""
         index = self.residuals.index
         return index.recording if len(self.recordings) > 1 else self.estimator.blocks.folds
 
