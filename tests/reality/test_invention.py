@@ -10,6 +10,7 @@ import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -353,6 +354,17 @@ def test_of_a_law_that_recordings_set_aside_do_not_show_the_others_decide(monkey
     assert [law.holdout_gain for law in verdict.invented] == [0.0]
     assert any("do not show the law at rolling_radius" in note for note in verdict.notes)
     assert sentences(verdict)[1].startswith("What was found does not show in ")
+
+
+def test_a_further_law_must_show_in_recordings_set_aside(monkeypatch):
+    for name in ("added", "pruned", "_told", "_indistinguishable"):
+        monkeypatch.setattr(invention, name, lambda *_: Written(None, (), ()))
+    monkeypatch.setattr(invention, "_proved", lambda *_: iter([(None, None)]))
+    held = SimpleNamespace(recordings=["one"])
+    for gain, terms, holds in ((0.0, (), True), (0.0, ("law",), False), (9.0, ("law",), True)):
+        monkeypatch.setattr(invention, "_gain_set_aside", lambda *_, gain=gain: gain)
+        found = invention._first_that_holds(Written(None, terms, ()), None, None, [], held, None)
+        assert (found is not None) == holds
 
 
 def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(monkeypatch):

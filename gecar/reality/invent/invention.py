@@ -162,11 +162,15 @@ def _first_that_holds(
     held: Residuals,
     nulls: Array,
 ) -> _Proven | None:
-    """Add the best law that is proved and that the held-out recordings confirm; None if there is none."""
+    """Add the best law that is proved and that the held-out recordings confirm; None if there is none.
+
+    A further law that they do not show is none: it may make up for what the form of those before it leaves.
+    """
     for law, proof in _proved(library, found, nulls):
         more = pruned(added(written, first, library, law), first)
         gain = _gain_set_aside(written.explained, more.explained, held)
-        if gain is not None:
+        unseen = gain == 0.0 and held.recordings
+        if gain is not None and not (unseen and written.terms):
             told = _told(library, law, _indistinguishable(law, found), proof, gain)
             return _Proven(first, more, law, told)
     return None
