@@ -173,7 +173,7 @@ def _add_others(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 def _best_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
     best = commands.add_parser("best", help="how well the best possible test would tell what a case conceals")
-    best.add_argument("case", nargs="+", help="names of cases that conceal one effect")
+    best.add_argument("case", nargs="+", help="names of cases that conceal one, two or three effects")
     best.add_argument("--others", type=int, default=10, help="cases whose backgrounds are taken (10)")
     best.set_defaults(command=_best)
     return best
@@ -338,10 +338,10 @@ def _score(chosen: argparse.Namespace) -> int:
 def _best(chosen: argparse.Namespace) -> int:
     from benchmarks.concealed.best_test import d_prime_beside_backgrounds  # noqa: PLC0415
 
-    print(f"{'case':<10} {'d_prime':>8} {'beside backgrounds':>19}")
+    print(f"{'case':<10} {'effect':<24} {'d_prime':>8} {'beside the rest':>16}")
     for name in chosen.case:
-        alone, beside = d_prime_beside_backgrounds(chosen.out, name, chosen.others)
-        print(f"{name:<10} {alone:8.1f} {beside:19.1f}", flush=True)
+        for effect, (alone, beside) in d_prime_beside_backgrounds(chosen.out, name, chosen.others).items():
+            print(f"{name:<10} {effect:<24} {alone:8.1f} {beside:16.1f}", flush=True)
     return 0
 
 

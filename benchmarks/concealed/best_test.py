@@ -2,9 +2,10 @@
 
 d' weighs an effect against the sensors' noise. But no robot is its file: a track 0.5 % wider by nature hides one that
 is 0.6 % wider by design. Here the difference an effect makes is weighed against noise and backgrounds together: those
-of the examination's other cases, thing by thing, each driven in the case's own world under the case's commands. No
-linear test does better than the filter matched to both (Kay, Fundamentals of Statistical Signal Processing II, ch. 4),
-and no tool can know more than the laws, and how often each small thing is met.
+of the examination's other cases, thing by thing, each driven in the case's own world under the case's commands. Where
+a case conceals several effects, each is weighed beside the others, of any strength, too. No linear test does better
+than the filter matched to both (Kay, Fundamentals of Statistical Signal Processing II, ch. 4), and no tool can know
+more than the laws, and how often each small thing is met.
 
 What the colour sensor read is compared along the path the camera shows: its turn and lens displace that, and its noise
 counts for nothing. For readings the figure is therefore an upper limit.
@@ -30,25 +31,28 @@ from benchmarks.concealed.recording import CHANNELS, even_ticks, seen_pose
 from benchmarks.concealed.rehearsal import Rehearsal, along
 from benchmarks.concealed.robot import Concealed
 
+KINDS = ("single", "double", "triple")
+ANY = 100.0  # times their strength that other effects of a case may have
 _LIGHT_AT = CHANNELS.index("reflection_pct")
 _FIELDS = {field.name for field in fields(Concealed)}
 
 
-def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> tuple[float, float]:
-    """Give the d' of what a case conceals, beside the sensors' noise and beside backgrounds as well.
+def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> dict[str, tuple[float, float]]:
+    """Give the d' of each effect of a case, beside the sensors' noise, and beside backgrounds and the others as well.
 
     Parameters
     ----------
     out
         Holds ``sealed/``.
     name
-        Of a case that conceals one effect.
+        Of a case that conceals one, two or three effects.
     count
         Of how many other cases of its world the backgrounds are taken.
 
     Returns
     -------
-    tuple[float, float]
+    dict[str, tuple[float, float]]
+        By the effect's id.
 
     Raises
     ------
@@ -56,22 +60,29 @@ def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> tuple[float,
         If the case conceals anything else, is not drawn anew as it was sealed, or no other has a background.
     """
     label: Mapping[str, Any] = read_label(out, name)
-    if label["kind"] != "single":
-        message = f"{name}: found a case of kind {label['kind']}, expected single"
+    if label["kind"] not in KINDS:
+        message = f"{name}: found a case of kind {label['kind']}, expected {', '.join(KINDS)}"
         raise ValueError(message)
     others = _others(out, label, count)
     hidden, case, worlds, acts = redrawn(out, label)
     plain = hidden.plain or hidden.off
     rehearsal = Rehearsal(case.manner.world, plain, acts, SECONDS, case.conditions)
-    shown = whitened(pairs_of(worlds, "on", "off"), case.conditions).ravel()
+    ids = [effect["id"] for effect in label["effects"]]
+    absent = {effect: f"without_{effect}" if len(ids) > 1 else "off" for effect in ids}
+    shown = {e: whitened(pairs_of(worlds, "on", absent[e]), case.conditions).ravel() for e in ids}
     columns = []
     for background, amounts in _imperfections(others):
         robot = background.on(plain, amounts)
         pairs = rehearsal.pairs([robot] * len(acts))
         if not amounts:
             pairs = _displaced(pairs, rehearsal, robot, plain, case.conditions.row_ticks)
-        columns.append(whitened(pairs, case.conditions).ravel())
-    small = np.stack(columns, axis=1) / math.sqrt(len(others))
+        columns.append(whitened(pairs, case.conditions).ravel() / math.sqrt(len(others)))
+    return {e: _told(shown[e], [*columns, *(ANY * shown[other] for other in ids if other != e)]) for e in ids}
+
+
+def _told(shown: Array, columns: Sequence[Array]) -> tuple[float, float]:
+    """Give the d' of a whitened difference, shape (n,), and beside what differs by standard normal times columns."""
+    small = np.stack(columns, axis=1)
     shared = small.T @ shown
     hides = shared @ np.linalg.solve(np.eye(small.shape[1]) + small.T @ small, shared)
     total = float(shown @ shown)

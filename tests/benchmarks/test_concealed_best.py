@@ -4,6 +4,7 @@ import json
 import math
 import shutil
 
+import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="MUJOCO IS MISSING: no concealed cases are drawn")
@@ -38,7 +39,7 @@ def with_background(out, name, background):
 
 def test_what_a_case_conceals_is_told_less_well_beside_backgrounds(drawn):
     label = json.loads((drawn / "sealed" / "a" / "label.json").read_text())
-    alone, beside = d_prime_beside_backgrounds(drawn, "a", 2)
+    alone, beside = d_prime_beside_backgrounds(drawn, "a", 2)["track_width"]
     assert math.isclose(alone, label["d_prime"]["track_width"], rel_tol=1e-3)
     assert 0.0 < beside < alone
 
@@ -46,7 +47,7 @@ def test_what_a_case_conceals_is_told_less_well_beside_backgrounds(drawn):
 def test_an_effect_that_backgrounds_have_too_is_hidden_and_another_is_not(drawn):
     for name in "bc":
         with_background(drawn, name, {"track": {"track_scale": 0.05}, "amounts": {"track": 1.0}})
-    alone, beside = d_prime_beside_backgrounds(drawn, "a", 2)
+    alone, beside = d_prime_beside_backgrounds(drawn, "a", 2)["track_width"]
     assert beside < 0.2 * alone
     with_background(drawn, "a", {"track": {"track_scale": 0.05}, "amounts": {"track": 1.0}})
 
@@ -54,9 +55,23 @@ def test_an_effect_that_backgrounds_have_too_is_hidden_and_another_is_not(drawn)
 def test_a_camera_with_a_lens_hides_some_of_what_the_sensor_shows(drawn):
     for name in "ab":
         with_background(drawn, name, {"camera_lens": {"lens": 0.02}, "amounts": {}})
-    alone, beside = d_prime_beside_backgrounds(drawn, "c", 2)
+    alone, beside = d_prime_beside_backgrounds(drawn, "c", 2)["sensor_lag"]
     # A lens is no lag: it hides little. Without displaced readings it would hide nothing at all.
     assert 0.9 * alone < beside < alone - 1e-3
+
+
+def test_of_several_effects_each_is_weighed_beside_the_others(drawn):
+    drawn_as = Manner("continuous", background=True)
+    draw_case("d", "double", ("track_width", "viscous_friction"), (3,), drawn, drawn_as)
+    found = d_prime_beside_backgrounds(drawn, "d", 2)
+    label = json.loads((drawn / "sealed" / "d" / "label.json").read_text())
+    assert found.keys() == label["d_prime"].keys()
+    for effect, (alone, beside) in found.items():
+        assert math.isclose(alone, label["d_prime"][effect], rel_tol=1e-3)
+        assert 0.0 < beside < alone
+    shutil.rmtree(drawn / "sealed" / "d")
+    again = best_test._told(np.array([3.0, 4.0]), [np.array([0.0, 1e6])])
+    assert again == pytest.approx((5.0, 3.0))
 
 
 def test_other_kinds_of_cases_and_changed_cases_are_refused(drawn):
@@ -65,8 +80,8 @@ def test_other_kinds_of_cases_and_changed_cases_are_refused(drawn):
     path.write_text(json.dumps({**label, "seed": [99]}))
     with pytest.raises(ValueError, match="expected the code that drew it"):
         d_prime_beside_backgrounds(drawn, "c", 2)
-    path.write_text(json.dumps({**label, "kind": "double"}))
-    with pytest.raises(ValueError, match="found a case of kind double, expected single"):
+    path.write_text(json.dumps({**label, "kind": "mixed"}))
+    with pytest.raises(ValueError, match="found a case of kind mixed, expected single, double, triple"):
         d_prime_beside_backgrounds(drawn, "c", 2)
 
 
