@@ -292,16 +292,27 @@ class _Stage(Confirmation):
 def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
     """Explain how the robot moved: by effects, by effects and laws, or by laws alone.
 
-    If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
+    Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
+    anew. If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
     """
     problem = _problem(context, context.robot, fitted, held)
-    motion = _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held), held))
+    motion = _motion(context, problem, held)
+    renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
+    if renewed is not None:
+        context.tell("once more with the camera's clocks as they are beside laws")
+        again = _motion(context, problem.filmed_as(renewed), held)
+        motion = min(motion, again, key=_left)
     if motion.explained.unexplained and not motion.laws:
         others = (_explained_without(context, each, fitted, held) for each in INSTRUMENTS)
         motion = next(filter(None, others), motion)
     if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
+
+
+def _motion(context: _Context, problem: Problem, held: Residuals) -> _Stage:
+    """Explain a problem of how the robot moved, by effects and laws."""
+    return _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held), held))
 
 
 def _explained_without(

@@ -18,6 +18,7 @@ from gecar.reality.selection.alternatives import ON_THE_ROBOT, late_as_well
 from gecar.reality.selection.problem import Problem, problem_of, scattered
 from gecar.reality.selection.stepwise import explain
 from gecar.world.robot import Robot
+from gecar.world.terms import Term
 
 
 def late(run: Recording, by_s: float) -> Recording:
@@ -88,3 +89,21 @@ def test_clocks_fitted_before_an_effect_was_known_are_fitted_anew_beside_it(
     monkeypatch.setattr(Problem, "with_clocks_beside", lambda *_: None)
     once = explain(problem).problem.residuals.clock_offsets_s
     assert float(np.mean(once - offsets)) > 0.003
+
+
+def test_clocks_fitted_before_a_law_was_known_are_fitted_anew_beside_it() -> None:
+    """Commands that act late make the robot late, which clocks take for theirs as long as no law is known."""
+    offsets = [0.03, -0.03, 0.025]
+    slow = Term(port="command", law="c1 * (store - command)", store="command", store_s=0.05, c1=1.0)
+    lagging = EV3.with_terms([slow])
+    problem = problem_of(beside(*offsets, robot=lagging), EV3, ("viscous_friction",))
+    taken, _ = with_fitted_clocks(problem.residuals, EV3.physics)
+    assert float(np.mean(taken.clock_offsets_s - offsets)) > 0.003
+    beside_law = replace(problem_of(taken, lagging, ("viscous_friction",)), clocks_fitted=True)
+    beside_law = beside_law.under(beside_law.known)
+    renewed = beside_law.with_clocks_beside(beside_law.known)
+    assert renewed is not None
+    again = problem.filmed_as(renewed)
+    assert again.residuals.clock_offsets_s == pytest.approx(offsets, abs=0.001)
+    assert again.clocks_fitted
+    assert not again.estimator.robot.term

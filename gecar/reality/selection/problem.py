@@ -296,11 +296,12 @@ class Problem:
         return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
 
     def with_clocks_beside(self, model: Model) -> Problem | None:
-        """Fit the camera's clocks anew beside a model's effects; None where that gains less than a name costs.
+        """Fit the camera's clocks anew beside a model's effects, and laws; None where too little is gained by it.
 
-        Fitted before an effect was known, clocks have taken up a part of it.
+        That is what a name costs. Fitted before these were known, clocks have taken up a part of them.
         """
-        if not (self.clocks_fitted and model.effects) or self.residuals.sensor:
+        anything = model.effects or self.estimator.robot.term
+        if not (self.clocks_fitted and anything) or self.residuals.sensor:
             return None
         problem, now = self, self.cost_of(model.physics)
         before = now
@@ -311,6 +312,12 @@ class Problem:
             if was - now < CONVERGED:
                 break
         return problem if before - now >= PRICE else None
+
+    def filmed_as(self, other: Problem) -> Problem:
+        """Return the problem with the camera's clocks and mark of another, of the same recordings."""
+        return replace(
+            self._on(other.residuals), catalogue=other.catalogue, clocks_fitted=other.clocks_fitted
+        )
 
     @property
     def mark_fitted(self) -> bool:
