@@ -45,7 +45,7 @@ PORTS_OF: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "full_duty": (("command", "supply_voltage", "motor_torque"), ("command",)),
     "command_slew": (("command",), ("store", "command")),
     "actuation_delay": (("command",), ("store", "command")),
-    "pose_delay": (("pose_x", "pose_y", "pose_heading"), ("ahead", "turn_rate")),
+    "pose_delay": (("pose_late", "pose_x", "pose_y", "pose_heading"), ("", "ahead", "turn_rate")),
     "motor_gain_asymmetry": (("command", "motor_torque"), ("command", "side")),
     "supply_voltage": (("supply_voltage", "command"), ("", "command")),
     "battery_resistance": (("supply_voltage",), ("draw", "current")),
