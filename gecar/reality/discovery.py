@@ -23,7 +23,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.beside import lessened
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
-from gecar.reality.invent.invention import invent
+from gecar.reality.invent.invention import OF_THE_MOUNT, invent
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
@@ -75,7 +75,6 @@ from gecar.world.terms import Term
 
 Spans = Mapping[str, Mapping[str, Interval]]
 
-OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wheels left 0.4
 INSTEAD = 0.7  # laws in the place of effects must leave so much less, or explain so much more, than laws beside them

@@ -476,6 +476,26 @@ def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
     assert [law.term.port for law in verdict.invented] == ["colour_reading"] * (not waxing)
 
 
+@pytest.mark.parametrize(
+    ("laws", "holds"),
+    [
+        ({"sensor_ahead": "0.0025"}, False),
+        ({"sensor_ahead": "0.0035"}, True),
+        ({"sensor_ahead": "0.0025", "sensor_aside": "-0.0025"}, True),
+        ({"sensor_aside": "0.0035 * positive(turn_rate - 100)"}, False),
+        ({"yaw_moment": "0.001"}, True),
+    ],
+)
+def test_a_law_of_the_sensors_place_must_move_it_farther_than_its_path_is_known_to(laws, holds):
+    run = recorded(EV3, 0)
+    residuals = motion_residuals([run], estimate_noise([run], EV3.physics, 1.0), 1.0, Threads(1))
+    library = SimpleNamespace(problem=SimpleNamespace(residuals=residuals))
+    terms = [Term(port=port, law=law) for port, law in laws.items()]
+    fitted = SimpleNamespace(physics=lambda _: EV3.physics)
+    law = SimpleNamespace(terms=terms, parameters=fitted, minimum=SimpleNamespace(z=None))
+    assert invention._beyond_path(library, law) == holds
+
+
 def test_a_language_without_a_law_of_one_part_writes_none():
     language = parse_grammar("<t> ::= motor_torque: c * speed * abs(speed) + c * sin(2 * angle)")
     assert verdict_on(DRAG, language=language).invented == ()

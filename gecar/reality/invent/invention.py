@@ -23,11 +23,12 @@ from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effect
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key
-from gecar.reality.invent.states import ranges
+from gecar.reality.invent.states import Physics, ranges, states
 from gecar.reality.invent.written import Written, added, with_constants_of
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.residuals.of_case import Residuals
+from gecar.reality.residuals.parting import PATH_KNOWN
 from gecar.reality.selection.homogeneity import flickers
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import LEAST_SHOWN, share_asked_for, spread_of_size
@@ -35,12 +36,15 @@ from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE
 from gecar.reality.verdict import Invented
 from gecar.world.ports import AT_A_POINT, N_TERMS, PORTS
+from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
 
 MOST_LAWS = 3
 TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
+MOSTLY = 0.9
+OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
 OF_PAIR = frozenset(("side", "other_angle", "other_speed"))  # and that one motor alone has not
@@ -185,7 +189,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _has_one_size(library, law):
+        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _beyond_path(library, law):
             yield law, proof
         if len(tried) == TRIED:
             return
@@ -199,6 +203,24 @@ def _has_one_size(library: Library, law: Law) -> bool:
         return True
     physics = law.parameters.physics(law.minimum.z)
     return not flickers(library.problem.residuals, library.model.physics, physics)
+
+
+def _beyond_path(library: Library, law: Law) -> bool:
+    """Whether laws of the place of the colour sensor move it farther than the path is known to which it was carried.
+
+    Mostly at least, where they move it most: a late sensor sits elsewhere in turns alone.
+    """
+    physics = law.parameters.physics(law.minimum.z)
+    moved = [
+        _along(term, library.problem.residuals, physics) for term in law.terms if term.port in OF_THE_MOUNT
+    ]
+    return not moved or float(np.quantile(np.hypot.reduce(moved), MOSTLY)) >= PATH_KNOWN[0]
+
+
+def _along(term: Term, residuals: Residuals, physics: Physics) -> Array:
+    """Return what a law of no side gives along all recordings, shape (rows,)."""
+    tables = [states(run, physics, term) for run in residuals.recordings]
+    return np.concatenate([np.broadcast_to(term.value(t), t["time"].shape)[:, 0] for t in tables])
 
 
 def _spread(library: Library, law: Law) -> float:
