@@ -51,7 +51,6 @@ from gecar.reality.selection.problem import problem_of
 from gecar.reality.selection.share import Share
 from gecar.reality.selection.stepwise import concluded, explain
 from gecar.reality.selection.thresholds import PRICE
-from gecar.reality.verdict import Misfit
 from gecar.report.verdict import sentences
 from gecar.report.verdict_page import verdict_html
 from gecar.world.effects import BY_ID, CATALOGUE
@@ -268,8 +267,7 @@ def test_each_wheel_has_a_law_of_its_own_that_comes_back_once_a_turn():
 def test_a_law_that_hardly_helps_whole_drives_is_written_only_where_all_of_it_is_asked_for(
     monkeypatch, share
 ):
-    hardly = {"x_m": Misfit(before=0.2, after=0.19, floor=0.1)}
-    monkeypatch.setattr(invention, "judge", lambda *_: hardly)
+    monkeypatch.setattr(invention, "gaps", lambda *_: (1.0, 0.9))
     monkeypatch.setattr(invention, "share_asked_for", lambda *_: share)
     runs = tuple(recorded(robot_with(dict(SCRUB)), seed) for seed in range(5))
     verdict = discover(Case("made", runs), catalogue=UNRELATED, language=FEW, invents=True)

@@ -26,7 +26,7 @@ from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
-from gecar.reality.selection.share import UNSEEN, share_asked_for
+from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import explain, resumed
 from gecar.reality.selection.thresholds import table
 from gecar.world.rollout import STEP_S
@@ -345,6 +345,24 @@ def test_a_gain_on_recordings_set_aside_is_judged_beside_its_own_spread(
     step = (*proof.explained.steps, *proof.candidates)[0]
     assert (step.holdout_gain > 0.0) == gains
     assert bool(proof.explained.steps) == kept
+
+
+@pytest.mark.parametrize(
+    ("share", "nearer", "helps"),
+    [
+        (Share(1.0, 0.9, 1.1), True, True),
+        (Share(1.0, 0.9, 1.1), False, False),
+        (Share(0.8, 0.6, 1.0), True, False),  # not all of it is asked for
+    ],
+)
+def test_an_effect_may_end_a_drive_farther_off_if_all_of_it_is_asked_for_and_all_channels_are_nearer(
+    monkeypatch: pytest.MonkeyPatch, share: Share, nearer: bool, helps: bool
+) -> None:
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    (step,) = explained.steps
+    monkeypatch.setattr(confirmation, "worsens", lambda *_: True)
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (2.0, 1.0 if nearer else 3.0))
+    assert confirmation._helps(explained, set_aside([1.0]), step.base, share) == helps  # type: ignore[arg-type]
 
 
 def test_bounds_of_a_share_hold_the_truth_where_residuals_are_correlated() -> None:

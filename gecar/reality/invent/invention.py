@@ -26,7 +26,7 @@ from gecar.reality.invent.sentences import key
 from gecar.reality.invent.states import Physics, ranges, states
 from gecar.reality.invent.written import Written, added, with_constants_of
 from gecar.reality.optimisation.least_squares import cost
-from gecar.reality.prove.holdout import Contender, judge
+from gecar.reality.prove.holdout import gaps
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.parting import PATH_KNOWN
 from gecar.reality.selection.homogeneity import flickers
@@ -271,17 +271,9 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     gain = cost(without) - cost(having)
     if gain <= 0.0 or share.margin <= 0.0:
         return None
-    robots = [e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after)]
-    whole = judge(*(Contender(robot, _of_own_kind(held)) for robot in robots)).values()
-    was, now = np.maximum([misfit.gaps for misfit in whole], 0.0).reshape(-1, 2).sum(axis=0)
+    known, found = (e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after))
+    was, now = gaps(known, found, held)
     return gain if now < (1.0 if share.is_whole else HELPS) * was else None
-
-
-def _of_own_kind(held: Residuals) -> Residuals:
-    """Return recordings set aside to be judged by their motion alone, where no path for readings is known yet."""
-    if held.sensor:
-        return held
-    return replace(held, recordings=tuple(replace(run, course=None) for run in held.recordings))
 
 
 def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,6 +77,18 @@ def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
             was_off, is_off, noise = (size / deviation for size in sizes)
             out[column] = Misfit(was_off, is_off, noise, deviation / COLUMNS[column][1])
     return out
+
+
+def gaps(before: Robot, after: Robot, held: Residuals) -> tuple[float, float]:
+    """Return how far whole drives set aside part beyond noise with two robots: sums over the channels, in units of it.
+
+    Where no path for the colour sensor is known yet, its readings are left out.
+    """
+    if not held.sensor:
+        held = replace(held, recordings=tuple(replace(run, course=None) for run in held.recordings))
+    whole = judge(Contender(before, held), Contender(after, held)).values()
+    was, now = np.maximum([misfit.gaps for misfit in whole], 0.0).reshape(-1, 2).sum(axis=0)
+    return float(was), float(now)
 
 
 def _errors_by_field(contender: Contender) -> dict[str, Array]:
