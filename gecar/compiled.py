@@ -14,13 +14,14 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from copy import copy
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import caching, cgutils, types
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
@@ -73,8 +74,29 @@ def _cache_folder() -> Path:
     return folder
 
 
+_NumbasIndex: Any = caching.IndexDataCacheFile  # numba has no types
+
+
+class _Index(_NumbasIndex):  # type: ignore[misc]
+    """A kernel's index in the cache, to which several processes may write at once.
+
+    Numba counts what it compiles. Two processes that compile at once take the same number: the code of one is then
+    found under the signature of the other, and in every later process what calls it fails to compile. Numbered apart
+    for each signature, the worst is that one of them has to compile again.
+    """
+
+    def save(self, key: object, data: object) -> None:
+        """Save machine code for a signature."""
+        own = hashlib.sha256(repr(key).encode()).hexdigest()[:12]
+        apart = copy(self)
+        pattern = self._data_name_pattern.replace("{number", f"{own}.{{number")
+        apart._data_name_pattern = pattern  # noqa: SLF001 - its own copy
+        super(_Index, apart).save(key, data)
+
+
 CACHE = _cache_folder()
 setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares its settings at run time
+setattr(caching, "IndexDataCacheFile", _Index)  # noqa: B010
 
 
 def is_cold(what: str = "complete") -> bool:

@@ -57,3 +57,29 @@ def test_what_no_later_process_would_find_in_the_cache_is_refused() -> None:
     with pytest.raises(TypeError, match="closes over the compiled factor"):
         doubled_by(doubled_by(0))
     assert doubled_by(0)(3.0) == 6.0
+
+
+def test_processes_that_compile_at_once_do_not_take_each_others_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, eight = (compiled._Index(str(tmp_path), "kernel", 1.0) for _ in range(2))
+    save_data = one._save_data
+
+    def slowly(name: str, code: str) -> None:
+        with monkeypatch.context() as patched:  # the other has looked before this one's index was there
+            patched.setattr(eight, "_load_index", dict)
+            eight.save("eight lanes", "code for eight lanes")
+        save_data(name, code)
+
+    monkeypatch.setattr(one, "_save_data", slowly)
+    one.save("one lane", "code for one lane")
+    assert eight.load("eight lanes") == "code for eight lanes"
+    assert eight.load("one lane") in (None, "code for one lane")
+    eight.save("one lane", "code for one lane")
+    assert eight.load("eight lanes") == "code for eight lanes"
+    assert eight.load("one lane") == "code for one lane"
+
+
+def test_what_is_compiled_is_kept_in_such_an_index() -> None:
+    assert compiled.caching.IndexDataCacheFile is compiled._Index
+    assert isinstance(compiled.kernel(lambda x: x)._cache._cache_file, compiled._Index)
