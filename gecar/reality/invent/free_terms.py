@@ -22,9 +22,7 @@ INNER_STEP = 0.1  # of an inner constant's size: one coordinate
 POINT_STEP_M = 0.05
 FARTHEST = 20.0  # coordinates of an inner constant: from a sixth of its size to six times
 SHORTEST_S = 0.01  # of a store's time constant: five steps, so that the law does the same at half the step
-SHORTEST_OWN_S = (
-    0.0025  # of one that moves by its own law, as a ramp does, which is the same at half the step
-)
+SHORTEST_OWN_S = 0.0025  # of one that moves by its own law: a ramp is the same at half the step
 PROBE = 0.1  # step of finite differences, in coordinates
 _STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
 _TURN = re.compile(r"\b(?:sin|cos)\(\w+ \* angle\)")
@@ -124,12 +122,12 @@ class FreeTerms:
         return tuple(term.with_constants(v) for term, v in zip(self.terms, values, strict=True))
 
 
-@lru_cache(maxsize=8192)
 def _shortest(term: Term) -> float:
     """Return the shortest time constant of a term's store [s]."""
     return SHORTEST_OWN_S if _OF_ITSELF.search(term.store) else SHORTEST_S
 
 
+@lru_cache(maxsize=8192)
 def usual_size(term: Term) -> float:
     """Return the size of a linear constant whose law gives about a hundredth of what is much at its port."""
     at_one = term.with_constants(dict.fromkeys(linear(term), 1.0))

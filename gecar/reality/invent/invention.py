@@ -43,7 +43,7 @@ Array = npt.NDArray[np.float64]
 MOST_LAWS = 3
 TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
-MOSTLY = 0.9
+MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
@@ -208,7 +208,7 @@ def _has_one_size(library: Library, law: Law) -> bool:
 def _beyond_path(library: Library, law: Law) -> bool:
     """Whether laws of the place of the colour sensor move it farther than the path is known to which it was carried.
 
-    Mostly at least, where they move it most: a late sensor sits elsewhere in turns alone.
+    Where they move it most: a late sensor sits elsewhere in turns alone.
     """
     physics = law.parameters.physics(law.minimum.z)
     moved = [

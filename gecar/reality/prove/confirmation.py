@@ -200,7 +200,7 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
 
     They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray. Then
-    it is enough, too, that all they measured is nearer: in one drive of few other errors may end it at the right place.
+    it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     if not explained.unexplained or share.is_whole:
@@ -213,8 +213,8 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
 
 
 def _is_nearer(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> bool:
-    """Whether all channels of whole drives set aside part by less with an effect, in units of noise."""
-    robot = problem.estimator.robot
+    """Whether whole drives set aside part by less with an effect, all channels together, in units of noise."""
+    robot, held = problem.estimator.robot, problem.with_its_camera(held, without.physics)
     was, now = gaps(robot.with_effects(without.values), robot.with_effects(with_effect.values), held)
     return now < was
 
