@@ -86,7 +86,7 @@ class _Index(_NumbasIndex):  # type: ignore[misc]
     """
 
     def save(self, key: object, data: object) -> None:
-        """Save machine code for a signature."""
+        """Save a signature's machine code."""
         own = hashlib.sha256(repr(key).encode()).hexdigest()[:12]
         apart = copy(self)
         pattern = self._data_name_pattern.replace("{number", f"{own}.{{number")

@@ -31,7 +31,7 @@ from benchmarks.concealed.recording import CHANNELS, even_ticks, seen_pose
 from benchmarks.concealed.rehearsal import Rehearsal, along
 from benchmarks.concealed.robot import Concealed
 
-KINDS = ("single", "double", "triple")
+_KINDS = ("single", "double", "triple")
 ANY = 100.0  # times their strength that other effects of a case may have
 _LIGHT_AT = CHANNELS.index("reflection_pct")
 _FIELDS = {field.name for field in fields(Concealed)}
@@ -60,8 +60,8 @@ def d_prime_beside_backgrounds(out: Path, name: str, count: int) -> dict[str, tu
         If the case conceals anything else, is not drawn anew as it was sealed, or no other has a background.
     """
     label: Mapping[str, Any] = read_label(out, name)
-    if label["kind"] not in KINDS:
-        message = f"{name}: found a case of kind {label['kind']}, expected {', '.join(KINDS)}"
+    if label["kind"] not in _KINDS:
+        message = f"{name}: found a case of kind {label['kind']}, expected {', '.join(_KINDS)}"
         raise ValueError(message)
     others = _others(out, label, count)
     hidden, case, worlds, acts = redrawn(out, label)

@@ -93,7 +93,7 @@ def start_worker() -> None:
 
 
 def end_late_workers_quietly() -> None:
-    """Let a worker that is forked after its run was stopped end without a word: the run's locks are gone by then.
+    """Let a worker that starts only after its run was stopped end silently: the run's locks are gone by then.
 
     To be called in the fork server, which prints what a worker raises before it works; later errors go to the parent.
     """

@@ -202,7 +202,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     word = _word(bool(effects), bool(invented), unexplained)
     unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
     nothing = not (effects or invented)
-    shows = nothing or len(unseen) < len(effects) or any(law.holdout_gain != 0.0 for law in invented)
+    shows = nothing or len(unseen) < len(effects) or any(law.shows for law in invented)
     where = _located(context, stages, fitted, found)
     seen_from = _limits(context, stages)
     return Verdict(
@@ -310,7 +310,7 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
 
 
 def _motion(context: _Context, problem: Problem, held: Residuals) -> _Stage:
-    """Explain a problem of how the robot moved, by effects and laws."""
+    """Explain the motion by effects, keep those that are confirmed, and add laws."""
     return _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held), held))
 
 

@@ -41,7 +41,7 @@ class Misfit:
 
     @property
     def is_worse(self) -> bool:
-        """Whether it was made worse."""
+        """Whether the channel is clearly farther off after than before."""
         return self.after > WORSE * self.before
 
     def as_json(self) -> dict[str, float]:
@@ -130,6 +130,11 @@ class Invented:
     spread: float
     range: Mapping[str, tuple[float, float]]
     size: Size
+
+    @property
+    def shows(self) -> bool:
+        """Whether the recordings set aside show it."""
+        return self.holdout_gain != 0.0
 
 
 @dataclass(frozen=True)

@@ -289,6 +289,11 @@ class Term(BaseModel):
         )
 
     @property
+    def of_itself(self) -> bool:
+        """Whether the store's law looks at the store: it moves by its own law, as one that adds up or ramps does."""
+        return "store" in self._store_law.variables
+
+    @property
     def row(self) -> npt.NDArray[np.float64]:
         """The term as the kernels take it, shape (TERM_WIDTH,); see `gecar.world.ports`."""
         row = np.zeros(TERM_WIDTH)
@@ -299,7 +304,7 @@ class Term(BaseModel):
             len(law),
             len(store),
         )
-        row[STORE_S], row[OF_ITSELF] = self.store_s, float("store" in self._store_law.variables)
+        row[STORE_S], row[OF_ITSELF] = self.store_s, float(self.of_itself)
         row[AT_X], row[AT_Y] = (self.constants.get(name, 0.0) for name in POINT)
         for number, name in enumerate(self.free):
             row[CONSTANTS + number] = self.constants[name]

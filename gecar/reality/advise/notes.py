@@ -81,7 +81,7 @@ def notes_on(
         f"The held-out recordings do not show the law at {law.term.port}. It was found on the {others}; parts of these,"
         " left out, confirm it."
         for law in invented
-        if split.held and law.holdout_gain == 0.0
+        if split.held and not law.shows
     ]
     notes += _log_faults(split, as_logged or split)
     notes += battery_at_its_end(found) if found else []

@@ -26,7 +26,6 @@ SHORTEST_OWN_S = 0.0025  # of one that moves by its own law: a ramp is the same 
 PROBE = 0.1  # step of finite differences, in coordinates
 _STEP = re.compile(r"\bpositive\((?:[^()]|\([^()]*\))*\)")
 _TURN = re.compile(r"\b(?:sin|cos)\(\w+ \* angle\)")
-_OF_ITSELF = re.compile(r"\bstore\b")
 _SUM = re.compile(r"store \+ \w+")
 _USUAL = {variable.id: variable.scale for variable in VARIABLES}
 
@@ -124,7 +123,7 @@ class FreeTerms:
 
 def _shortest(term: Term) -> float:
     """Return the shortest time constant of a term's store [s]."""
-    return SHORTEST_OWN_S if _OF_ITSELF.search(term.store) else SHORTEST_S
+    return SHORTEST_OWN_S if term.of_itself else SHORTEST_S
 
 
 @lru_cache(maxsize=8192)

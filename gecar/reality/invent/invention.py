@@ -206,7 +206,7 @@ def _has_one_size(library: Library, law: Law) -> bool:
 
 
 def _beyond_path(library: Library, law: Law) -> bool:
-    """Whether laws of the place of the colour sensor move it farther than the path is known to which it was carried.
+    """Whether laws that move the colour sensor move it by more than its path is known to; true of all others.
 
     Where they move it most: a late sensor sits elsewhere in turns alone.
     """
@@ -218,7 +218,7 @@ def _beyond_path(library: Library, law: Law) -> bool:
 
 
 def _along(term: Term, residuals: Residuals, physics: Physics) -> Array:
-    """Return what a law of no side gives along all recordings, shape (rows,)."""
+    """Return a law's value at every row of all recordings, at a port that has no sides, shape (rows,)."""
     tables = [states(run, physics, term) for run in residuals.recordings]
     return np.concatenate([np.broadcast_to(term.value(t), t["time"].shape)[:, 0] for t in tables])
 

@@ -219,7 +219,7 @@ def _paused(term: Term) -> str:
 
 
 def _holding(term: Term) -> str:
-    """Name motors that a firmware turns back at duty 0: a store follows the shaft while a motor is driven."""
+    """Name motors that hold their angle at duty 0: a store follows the shaft while a motor is driven."""
     follows = re.fullmatch(r"store \+ \(angle - store\) \* positive\(abs\(command\) - \w+\)", term.store)
     held = re.fullmatch(r"\w+ \* \(store - angle\) \* positive\(\w+ - abs\(command\)\)", term.law)
     return "motors that hold the angle at which they were stopped" if follows and held else ""

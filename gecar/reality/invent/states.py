@@ -67,7 +67,7 @@ def _filled(term: Term, found: Mapping[str, Array], t: Array) -> Array:
         return np.zeros((len(t), 2))
     filling = Term(**{**term.as_table(), "law": term.store, "side": "both"})
     step_s = float(np.median(np.diff(t)))
-    if "store" not in filling.parsed.variables:
+    if not term.of_itself:
         keep = float(np.exp(-step_s / term.store_s))
         out: Array = lfilter([1.0 - keep], [1.0, -keep], filling.value(found), axis=0)
         return out

@@ -213,7 +213,7 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
 
 
 def _is_nearer(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> bool:
-    """Whether whole drives set aside part by less with an effect, all channels together, in units of noise."""
+    """Whether whole drives are nearer to those set aside with an effect, all channels together, in units of noise."""
     robot, held = problem.estimator.robot, problem.with_its_camera(held, without.physics)
     was, now = gaps(robot.with_effects(without.values), robot.with_effects(with_effect.values), held)
     return now < was

@@ -80,7 +80,7 @@ def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
 
 
 def gaps(before: Robot, after: Robot, held: Residuals) -> tuple[float, float]:
-    """Return how far whole drives set aside part beyond noise with two robots: sums over the channels, in units of it.
+    """Return how far two robots' drives are from those set aside, beyond noise: summed over channels, in units of it.
 
     Where no path for the colour sensor is known yet, its readings are left out.
     """
