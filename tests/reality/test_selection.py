@@ -123,6 +123,22 @@ def test_a_fold_is_judged_at_coordinates_fitted_to_the_others(least: float) -> N
     assert np.isfinite(found).all()
 
 
+def test_a_coordinate_that_stays_is_the_same_without_every_fold() -> None:
+    rng = np.random.default_rng(0)
+    a, folds = rng.normal(size=(60, 3)), np.repeat([0, 1, 2], 20)
+    a[:20, 2] *= 50.0  # the first fold alone determines the third
+    beside = 0.01 * rng.normal(size=60)
+    z = np.append(np.linalg.lstsq(a[:, :2], beside, rcond=None)[0], 0.1)
+    y, bounds = beside + 0.1 * a[:, 2], (np.full(3, -9.0), np.full(3, 9.0))
+    minimum = Minimum(z, y - a @ z, cost(y - a @ z))
+    still = np.array([False, False, True])
+    found = left_out_costs(minimum, -a, bounds, lambda v: y - v @ a.T, folds, 0.02, still)
+    for k in range(3):
+        rest = folds != k
+        without = np.linalg.lstsq(a[rest, :2], beside[rest], rcond=None)[0]
+        assert found[k] == pytest.approx(cost((beside - a[:, :2] @ without)[~rest]), rel=1e-2)
+
+
 def test_a_newton_step_that_leaves_the_range_of_its_derivatives_is_cut() -> None:
     """Without the first fold the second one's slope, nearly 0, asks for a step of -150."""
 

@@ -195,6 +195,7 @@ def left_out_costs(
     residual: Residual,
     folds: npt.NDArray[np.integer[Any]],
     least: float = -1.0,
+    still: npt.NDArray[np.bool_] | None = None,
 ) -> Array:
     """Return the robust cost of each fold at coordinates fitted without it, one Newton step from the minimum.
 
@@ -215,6 +216,8 @@ def left_out_costs(
         Fold of each residual, shape (n,).
     least
         Coordinates of which the other folds hold no more than this share of the information become 0.
+    still
+        Which coordinates stay as they are, shape (k,); default: none.
 
     Returns
     -------
@@ -222,14 +225,15 @@ def left_out_costs(
         Shape (largest fold + 1,); 0 for folds without residuals.
     """
     w, names = weights(minimum.errors), np.unique(folds)
+    moves = np.ones(len(minimum.z), bool) if still is None else ~still
     normal, starts, steps = slopes.T @ (w[:, None] * slopes), [], []
     for k in names:
         rows = folds == k
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
         pull = slopes[rows].T @ (w[rows] * minimum.errors[rows])
-        known = np.flatnonzero(np.diag(rest) > least * np.diag(normal))
+        known = np.flatnonzero(moves & (np.diag(rest) > least * np.diag(normal)))
         ridge = RIDGE * np.diag(np.maximum(np.diag(normal)[known], 1e-9))
-        start, step = np.zeros((2, len(minimum.z)))
+        start, step = np.where(moves, 0.0, minimum.z), np.zeros(len(minimum.z))
         start[known] = minimum.z[known]
         step[known] = np.linalg.solve(rest[np.ix_(known, known)] + ridge, pull[known])
         starts.append(start)

@@ -92,7 +92,8 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
     if not len(model.z):
         return np.bincount(estimator.blocks.folds, costs(model.errors)).astype(float)
     minimum = Minimum(model.z, model.errors, model.cost)
-    # A parameter that one recording alone determines is not known without it: it stays neutral.
+    # A parameter that one recording alone determines is not known without it: it is neutral. No step tells where on the
+    # floor a place would be without it: it stays, or it would lie in the way of other recordings.
     return left_out_costs(
         minimum,
         estimator.own_sensitivities(model),
@@ -100,6 +101,7 @@ def _left_out_costs(estimator: Estimator, model: Model) -> Array:
         estimator.residual(model.parameters),
         estimator.blocks.folds,
         NEGLIGIBLE,
+        np.array([not c.effect.differentiable for c in model.parameters.coordinates], bool),
     )
 
 
