@@ -23,7 +23,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.beside import lessened
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
-from gecar.reality.invent.invention import OF_THE_MOUNT, invent
+from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_wheels
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
@@ -52,7 +52,7 @@ from gecar.reality.selection.alternatives import alternatives, late_as_well
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, explain, left_before, left_share, resumed
-from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
+from gecar.reality.selection.thresholds import NEGLIGIBLE, PRICE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import contains_neutral, hulls, intervals
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -311,7 +311,8 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
 
 def _motion(context: _Context, problem: Problem, held: Residuals) -> _Stage:
     """Explain the motion by effects, keep those that are confirmed, and add laws."""
-    return _with_laws(context, _with_intervals(context, explained_and_confirmed(problem, held), held))
+    motion = _with_intervals(context, explained_and_confirmed(problem, held), held)
+    return _with_laws(context, _with_law_of_both_wheels(context, motion))
 
 
 def _explained_without(
@@ -378,6 +379,25 @@ def _explain_sensor(
     return _with_laws(context, _with_intervals(context, seen, beside))
 
 
+def _with_law_of_both_wheels(context: _Context, stage: _Stage) -> _Stage:
+    """Add a law of what the other wheel does, or put it in the place of effects, where it explains more than they do.
+
+    What no effect is like may leave less than is material beside one that imitates it.
+    """
+    found = (
+        of_both_wheels(stage.explained, context.language)
+        if context.language and stage.explained.steps
+        else None
+    )
+    if found is None:
+        return stage
+    language, imitations = found
+    bare = _without(stage.explained, imitations)
+    instead = _with_laws_on(context, language, replace(stage, spans={}), bare)
+    gains = [_gain(bare, each) for each in (stage, instead)]
+    return instead if _is_material(instead, stage) and gains[1] - gains[0] >= PRICE else stage
+
+
 def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     """Add laws that explain what a stage's effects do not, where laws are wanted.
 
@@ -389,23 +409,29 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     if context.language is None or not (context.invents or _is_left(stage)):
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
-    if not (context.invents or stage.explained.unexplained or _is_material(beside)):
+    if not (context.invents or stage.explained.unexplained or _is_material(beside, stage)):
         beside = stage
     if not _is_left(beside):
         return beside
     named = stage.explained.steps
-    doubtful = lessened(beside.explained, beside.laws, stage.explained) if beside.laws else named
+    laws = beside.laws[len(stage.laws) :]
+    doubtful = lessened(beside.explained, laws, stage.explained) if laws else named
     if not doubtful:
         return beside
     context.tell(f"laws in the place of {', '.join(step.effect for step in doubtful)}")
-    bare = stage.explained
-    for step in doubtful:
-        bare = dropped(bare, step)
+    bare = _without(stage.explained, doubtful)
     alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
     gains = [_gain(bare, each) for each in (beside, alone)]
     far_less = _left(alone) < INSTEAD * _left(beside)
     far_more = max(_left(alone), 1.0) <= max(_left(beside), 1.0) and gains[0] < INSTEAD * gains[1]
     return alone if far_less or far_more else beside
+
+
+def _without(explained: Explanation, steps: Sequence[Step]) -> Explanation:
+    """Return an explanation without some of its effects."""
+    for step in steps:
+        explained = dropped(explained, step)
+    return explained
 
 
 def _is_left(stage: _Stage) -> bool:
@@ -421,10 +447,10 @@ def _is_left(stage: _Stage) -> bool:
     return _left(stage) >= FOR_A_LAW and share > left_share(explained.taken.effects)
 
 
-def _is_material(stage: _Stage) -> bool:
-    """Whether one of a stage's laws moves the robot, or changes a reading, by a material amount."""
+def _is_material(stage: _Stage, before: _Stage) -> bool:
+    """Whether one of a stage's further laws moves the robot, or changes a reading, by a material amount."""
     material = stage.explained.problem.material
-    return any(material.times(law.size) >= 1.0 for law in stage.invented)
+    return any(material.times(law.size) >= 1.0 for law in stage.invented[len(before.invented) :])
 
 
 def _gain(bare: Explanation, stage: _Stage) -> float:
@@ -437,9 +463,10 @@ def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained
     """Return a stage with this explanation in place of its own, and laws added to it."""
     refused = {step.effect: step for step in stage.candidates}  # each once, as it was taken last
     written = invent(explained, stage.held, language, context.seed, context.tell, [*refused.values()])
-    stage = replace(stage, explained=written.explained, laws=written.terms, invented=written.invented)
     if not written.terms:
-        return stage
+        return replace(stage, explained=written.explained)
+    laws, told = (*stage.laws, *written.terms), (*stage.invented, *written.invented)
+    stage = replace(stage, explained=written.explained, laws=laws, invented=told)
     named = {step.effect for step in written.explained.steps}
     candidates = tuple(step for step in stage.candidates if step.effect not in named)
     return replace(stage, candidates=candidates, spans=_spans(context, written.explained))

@@ -63,6 +63,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable("slip", "m/s", "the tyre's slip", 0.05, True),
     Variable("other_angle", "rad", "the other shaft's angle", 1.0, True),
     Variable("other_speed", "rad/s", "the other shaft's speed", 10.0, True),
+    Variable("other_command", "-", "the other motor's commanded duty", 1.0, True),
     Variable("side", "-", "-1 on the left, +1 on the right", 1.0, True),
     Variable("ahead", "m/s", "the speed ahead", 0.3),
     Variable("aside", "m/s", "the speed to the left", 0.1),

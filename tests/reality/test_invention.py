@@ -35,12 +35,14 @@ from gecar.reality.invent.sentences import (
     elsewhere,
     joined,
     key,
+    looking_at,
     physics_grammar,
     pieces,
     read_sentence,
     single_laws,
 )
 from gecar.reality.invent.written import Written
+from gecar.reality.materiality import DEFAULT
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, read_case
 from gecar.reality.residuals.of_case import motion_residuals
@@ -368,8 +370,43 @@ def test_a_further_law_must_show_in_recordings_set_aside(monkeypatch):
 def test_a_law_that_is_not_material_is_not_told_where_nothing_material_is_left(monkeypatch):
     monkeypatch.setattr(discovery, "_is_left", lambda _: True)
     assert with_oval_wheels(0.004).verdict == "nothing"
-    monkeypatch.setattr(discovery, "_is_material", lambda _: True)
+    monkeypatch.setattr(discovery, "_is_material", lambda *_: True)
     assert with_oval_wheels(0.004).verdict == "invented"
+
+
+WITH_THE_OTHER = parse_grammar(
+    "<term> ::= supply_voltage: c * 1 | command: c * command * positive(abs(other_command) - 0.01)"
+)
+WEAK = [effect for effect in CATALOGUE if effect.id in ("supply_voltage", "viscous_friction", "clock_skew")]
+
+
+@cache
+def verdict_on_weak_motors(language, *table):
+    runs = tuple(recorded(robot_with(dict(table)) if table else FLAT, seed, most=5) for seed in range(5))
+    return discover(Case("made", runs), catalogue=WEAK, language=language)
+
+
+FLAT = EV3.with_effects({"supply_voltage": {"scale": 0.97}})
+WEAKER_TOGETHER = frozen(
+    port="command", law="-c1 * command * positive(abs(other_command) - k1)", c1=0.02, k1=0.01
+)
+
+
+def test_motors_that_weaken_each_other_have_a_law_and_no_flat_battery():
+    found = verdict_on_weak_motors(WITH_THE_OTHER, *WEAKER_TOGETHER)
+    assert [effect.id for effect in found.effects] == []
+    (law,) = found.invented
+    assert law.term.port == "command"
+    assert law.parameters["c1"].value == pytest.approx(-0.02, rel=0.1)
+    assert DEFAULT.times(law.size) > 1.0
+    # Without the law the recordings ask for a battery that is not flat.
+    assert [effect.id for effect in verdict_on_weak_motors(None, *WEAKER_TOGETHER).effects] != []
+
+
+def test_a_flat_battery_is_named_beside_laws_of_the_other_wheel():
+    found = verdict_on_weak_motors(WITH_THE_OTHER)
+    assert [effect.id for effect in found.effects] == ["supply_voltage"]
+    assert found.invented == ()
 
 
 def with_nothing_named(robot, *effects):
@@ -688,6 +725,8 @@ def test_sums_are_taken_apart_and_put_together():
         ({"port": "pose_late", "law": "c1 * time", "c1": 0.009}, "a camera whose clock runs slow"),
         ({"port": "caster_friction", "law": "c1", "c1": 0.04}, "a caster that drags"),
         ({"port": "command", "law": "c1", "c1": -0.006}, "motors that drive less forward and more backward"),
+        ({"port": "command", "law": "c1 * command * positive(abs(other_command) - k1)", "c1": -0.02, "k1": 0.01},
+         "motors that are weaker while the other is driven, too"),
         ({"port": "colour_reading", "law": "c1 * reading * cos(heading)", "c1": 0.1}, "light that comes from one side"),
         ({"port": "pose_toward", "law": "c1 * distance * distance ** 2", "c1": 0.1, "at_x": 1.2, "at_y": 0.6},
          "a camera whose lens bends the picture, about (1.20, 0.60)"),
@@ -696,6 +735,14 @@ def test_sums_are_taken_apart_and_put_together():
 )  # fmt: skip
 def test_what_a_law_looks_like(table, words):
     assert words in looks_like(Term(**table))
+
+
+def test_laws_of_the_other_wheel_are_those_that_look_at_it():
+    language = looking_at(physics_grammar(), invention.OF_OTHER)
+    laws = [law for law, *_ in single_laws(language)]
+    assert {law.port for law in laws} == {"command", "motor_torque"}
+    assert all(invention.OF_OTHER & set(law.parsed.variables) for law in laws)
+    assert looking_at(FEW, invention.OF_OTHER) is None
 
 
 def test_the_laws_elsewhere_are_those_at_other_ports():

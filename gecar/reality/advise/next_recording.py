@@ -50,6 +50,9 @@ LIBRARY: dict[str, Commands] = {
     "arcs to both sides": _holds(1.5, (50, 20), (20, 50), (60, 30), (30, 60), (-50, -20), (-20, -50)),
     "full steps": _holds(0.7, *(d for k in (80, -80, 80, -80) for d in ((k, k), (0, 0), (k, -k), (0, 0)))),
     "long and slow, then long and fast": _holds(4.0, (25, 25), (-25, -25), (60, 60), (-60, -60)),
+    "one motor at a time, then both": _holds(
+        1.0, *(d for k in (30, 60, -45) for d in ((k, 0), (0, k), (k, k)))
+    ),
     "the line, crossed to and fro": _holds(0.8, *((d, d) for d in (25, -25, 25, -25, 40, -40, 40, -40))),
 }
 

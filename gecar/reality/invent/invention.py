@@ -22,11 +22,11 @@ from gecar.reality.fitting.model import Step
 from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
-from gecar.reality.invent.sentences import key
+from gecar.reality.invent.sentences import key, looking_at, single_laws
 from gecar.reality.invent.states import Physics, ranges, states
 from gecar.reality.invent.written import Written, added, with_constants_of
 from gecar.reality.optimisation.least_squares import cost
-from gecar.reality.prove.holdout import gaps
+from gecar.reality.prove.holdout import Contender, gaps
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.parting import PATH_KNOWN
 from gecar.reality.selection.homogeneity import flickers
@@ -45,9 +45,12 @@ TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
 MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
+OF_OTHER = frozenset(
+    ("other_angle", "other_speed", "other_command")
+)  # variables of a wheel's law: the other's state
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
-OF_PAIR = frozenset(("side", "other_angle", "other_speed"))  # and that one motor alone has not
+OF_PAIR = OF_OTHER | {"side"}  # and that one motor alone has not
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
@@ -128,6 +131,25 @@ def invent(
         if not written.explained.unexplained:
             break
     return replace(written, invented=with_constants_of(written, first)) if written.terms else written
+
+
+def of_both_wheels(explained: Explanation, grammar: Grammar) -> tuple[Grammar, list[Step]] | None:
+    """Return a language of laws of what the other wheel does, and the effects that the best of them stands for.
+
+    None if no such law explains more than effects did. But for the battery's load no effect of the catalogue is of both
+    wheels together: what is imitates a flat battery, a clock or friction.
+    """
+    language = None if explained.problem.on_bench else looking_at(grammar, OF_OTHER)
+    if language is None:
+        return None
+    first = replace(explained, taken=explained.problem.estimator.at(explained.taken, explained.taken.z))
+    library = Library(first.problem, first.taken)
+    best = max(single_laws(language), key=library.gain)
+    if library.gain(best) < PRICE:
+        return None
+    law = fit(library, library.started(best))
+    beside = pruned(added(Written(first, (), ()), first, library, law), first).explained.taken.effects
+    return language, [step for step in explained.steps if step.effect not in beside]
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -262,17 +284,21 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     """
     if not held.recordings:
         return 0.0
-    plain = [held.errors(e.taken.physics) for e in (before, after)]
+    both = before, after
+    filmed = [e.problem.with_its_camera(held, e.taken.physics) for e in both]
+    plain = [seen.errors(e.taken.physics) for seen, e in zip(filmed, both, strict=True)]
     if np.sum((plain[0] - plain[1]) ** 2) < LEAST_SHOWN:
         return 0.0
-    beside = [held.errors(e.problem.with_small_changes(e.taken)) for e in (before, after)]
+    beside = [
+        seen.errors(e.problem.with_small_changes(e.taken)) for seen, e in zip(filmed, both, strict=True)
+    ]
     shares = [(share_asked_for(held.index, *errors), errors) for errors in (plain, beside)]
     share, (without, having) = max(shares, key=lambda each: each[0].margin)
     gain = cost(without) - cost(having)
     if gain <= 0.0 or share.margin <= 0.0:
         return None
-    known, found = (e.problem.estimator.robot.with_effects(e.taken.values) for e in (before, after))
-    was, now = gaps(known, found, held)
+    robots = (e.problem.estimator.robot.with_effects(e.taken.values) for e in both)
+    was, now = gaps(*(Contender(robot, seen) for robot, seen in zip(robots, filmed, strict=True)))
     return gain if now < (1.0 if share.is_whole else HELPS) * was else None
 
 

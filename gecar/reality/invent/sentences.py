@@ -219,6 +219,14 @@ def elsewhere(grammar: Grammar, ports: Sequence[str]) -> Grammar | None:
     return _only(grammar, numbers) if numbers else None
 
 
+def looking_at(grammar: Grammar, variables: frozenset[str]) -> Grammar | None:
+    """Return a grammar of the start's alternatives whose first law looks at some variables; None if there is none."""
+    firsts = (_first(grammar, number) for number in range(len(grammar.rules[0].productions)))
+    looks = [variables & {v for term in read_sentence(law) for v in term.parsed.variables} for law in firsts]
+    numbers = [number for number, seen in enumerate(looks) if seen]
+    return _only(grammar, numbers) if numbers else None
+
+
 def _ports_of(grammar: Grammar) -> list[set[str]]:
     """Return the ports of each of the start's alternatives."""
     firsts = (_first(grammar, number) for number in range(len(grammar.rules[0].productions)))

@@ -47,7 +47,8 @@ def states(run: RecordingResiduals, physics: Physics, term: Term) -> dict[str, A
         "current": (command * volts - p["back_emf_constant"] * speed) / p["resistance"],
         "load": both(np.full(len(t), 0.5 * p["mass"] * 9.81 * (1.0 - p["com_ahead"] / p["caster_ahead"]))),
         "slip": np.zeros_like(speed), "other_angle": angle[:, ::-1], "other_speed": speed[:, ::-1],
-        "side": np.tile((-1.0, 1.0), (len(t), 1)), "ahead": both(rows[:, AHEAD]), "aside": both(rows[:, ASIDE]),
+        "other_command": command[:, ::-1], "side": np.tile((-1.0, 1.0), (len(t), 1)),
+        "ahead": both(rows[:, AHEAD]), "aside": both(rows[:, ASIDE]),
         "turn_rate": both(rows[:, YAW_RATE]), "x": both(rows[:, X]), "y": both(rows[:, Y]),
         "heading": both(rows[:, HEADING]),
     }  # fmt: skip

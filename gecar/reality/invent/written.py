@@ -151,15 +151,16 @@ def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, .
         known |= {name: Interval(value, value, value, "") for name, value in fixed.items()}
     told = zip(written.invented, written.terms, intervals, strict=True)
     return tuple(
-        replace(_told_of_fewer(law, term, written), term=term, parameters=found, looks_like=looks_like(term))
+        replace(_as_written(law, term, written), term=term, parameters=found, looks_like=looks_like(term))
         for law, term, found in told
     )
 
 
-def _told_of_fewer(law: Invented, term: Term, written: Written) -> Invented:
-    """Return what is said of a law that has lost a part: where it was tested, and what it does to the robot now."""
-    if law.term.law == term.law:
-        return law
+def _as_written(law: Invented, term: Term, written: Written) -> Invented:
+    """Return what is said of a law: of its variables where it was tested, and what it does to the robot as it is now.
+
+    When it was added it may have taken the place of an effect, and have changed little.
+    """
     problem, model = written.explained.problem, written.explained.taken
     robot = problem.estimator.robot
     rest = robot.with_terms([each for each in robot.term if each != term]).with_effects(model.values)

@@ -12,7 +12,7 @@ from gecar.reality.fitting.gain_offset import EFFECT as GAIN
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
-from gecar.reality.prove.holdout import gaps, reading_error
+from gecar.reality.prove.holdout import Contender, gaps, reading_error
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import most_uneven, worsens
@@ -215,7 +215,7 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
 def _is_nearer(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> bool:
     """Whether whole drives are nearer to those set aside with an effect, all channels together, in units of noise."""
     robot, held = problem.estimator.robot, problem.with_its_camera(held, without.physics)
-    was, now = gaps(robot.with_effects(without.values), robot.with_effects(with_effect.values), held)
+    was, now = gaps(*(Contender(robot.with_effects(m.values), held) for m in (without, with_effect)))
     return now < was
 
 

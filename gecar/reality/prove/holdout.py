@@ -79,16 +79,23 @@ def judge(before: Contender, after: Contender) -> dict[str, Misfit]:
     return out
 
 
-def gaps(before: Robot, after: Robot, held: Residuals) -> tuple[float, float]:
+def gaps(before: Contender, after: Contender) -> tuple[float, float]:
     """Return how far two robots' drives are from those set aside, beyond noise: summed over channels, in units of it.
 
     Where no path for the colour sensor is known yet, its readings are left out.
     """
-    if not held.sensor:
-        held = replace(held, recordings=tuple(replace(run, course=None) for run in held.recordings))
-    whole = judge(Contender(before, held), Contender(after, held)).values()
+    whole = judge(_without_readings(before), _without_readings(after)).values()
     was, now = np.maximum([misfit.gaps for misfit in whole], 0.0).reshape(-1, 2).sum(axis=0)
     return float(was), float(now)
+
+
+def _without_readings(contender: Contender) -> Contender:
+    """Return a contender whose recordings have no readings, unless they are what was fitted."""
+    held = contender.held
+    if held.sensor:
+        return contender
+    unread = tuple(replace(run, course=None) for run in held.recordings)
+    return replace(contender, held=replace(held, recordings=unread))
 
 
 def _errors_by_field(contender: Contender) -> dict[str, Array]:

@@ -106,7 +106,8 @@ def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v
     v.left_heading = v.right_heading = s.heading
     v.left_reading = v.right_reading = 0.0
     v.left_distance = v.right_distance = v.left_store = v.right_store = 0.0
-    v.left_command, v.right_command = left_command, right_command
+    v.left_command = v.right_other_command = left_command
+    v.right_command = v.left_other_command = right_command
     v.left_angle = v.right_other_angle = s.left_angle
     v.right_angle = v.left_other_angle = s.right_angle
     v.left_speed = v.right_other_speed = s.left_speed
