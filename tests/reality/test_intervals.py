@@ -132,6 +132,28 @@ def test_a_size_known_by_its_product_with_a_share_is_not_neutral() -> None:
     assert 0.5 < spans[effect]["duty_pct"].low < 1.0 < spans[effect]["duty_pct"].high
 
 
+def test_parameters_known_by_their_product_alone_go_as_far_as_a_profile_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A dead band of 1 % with an offset of 1 is hardly one of 2 % with 0.5: a straight line leaves that valley."""
+    effects = ("dead_band", "rotor_inertia")
+    runs = [recorded(EV3, 0)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    estimator = problem_of(residuals, EV3, effects).estimator
+    start = {"dead_band": {"duty_pct": 2.0, "offset_share": 0.5}, "rotor_inertia": {"scale": 0.9}}
+    parameters = free(EV3, effects)
+    model = estimator.at(estimator.fit(effects, start), parameters.vector(start))
+    shared, own = (np.resize(bumps(k, 1, 40.0), len(model.errors)) for k in (1, 2))
+    slopes = np.stack([shared, shared + 0.3 * own, own], axis=1)
+    monkeypatch.setattr(type(estimator), "own_sensitivities", lambda *_: slopes)
+    monkeypatch.setattr("gecar.reality.uncertainty.intervals.reaches", lambda *_: (0.9, 1.7))
+    found = intervals(estimator, model)
+    band, inertia = found["dead_band"]["duty_pct"], found["rotor_inertia"]["scale"]
+    # 2 % of duty, by as much as the profile says, and by what the law is off by.
+    assert (band.low, band.high) == pytest.approx((1.07, 3.71), abs=0.03)
+    assert inertia.high - inertia.low < 0.2
+
+
 def test_intervals_hold_for_robots_with_and_without_what_is_too_small_to_be_named() -> None:
     named, beside = Interval(7.0, 5.3, 8.7, "ms"), Interval(9.7, 8.2, 11.2, "ms")
     assert hulls({"time": beside}, {"time": named}) == {"time": Interval(7.0, 5.3, 11.2, "ms")}

@@ -15,6 +15,7 @@ from gecar.reality.fitting.parameters import Coordinate
 from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.selection.thresholds import ALIKE
 from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID
@@ -107,6 +108,15 @@ def _is_one_of_several(model: Model, k: int) -> bool:
     return coordinate.parameter.worthwhile > 0.0 and len(coordinate.effect.parameters) > 1
 
 
+def _in_a_valley(model: Model, slopes: Array) -> list[bool]:
+    """Return of each coordinate whether recordings hardly tell it from another of the same effect."""
+    w, effects = weights(model.errors), np.array([c.effect.id for c in model.parameters.coordinates])
+    inverse = np.linalg.pinv(slopes.T @ (w[:, None] * slopes), hermitian=True)
+    sd = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    alike = (np.abs(inverse / np.outer(sd, sd)) > ALIKE) & (effects[:, None] == effects)
+    return (alike.sum(axis=1) > 1).tolist()
+
+
 def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:
     """Return 95 % intervals of every parameter of a model, by effect and label."""
     if not model.effects:
@@ -117,14 +127,17 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
     for k, (left, right) in walked_quantiles(estimator, model, seed).items():
         spans[k] = (max(float(model.z[k]) - left, 0.0), max(right - float(model.z[k]), 0.0))
     everything, residual = np.arange(len(model.z)), estimator.residual(model.parameters)
-    for k, (c, half) in enumerate(
-        zip(model.parameters.coordinates, half_widths(estimator, model), strict=True)
-    ):
+    slopes = estimator.own_sensitivities(model)
+    halves, curved = half_widths_of(slopes, model.errors, estimator.blocks), _in_a_valley(model, slopes)
+    for k, (c, half) in enumerate(zip(model.parameters.coordinates, halves, strict=True)):
         z = float(model.z[k])
         if k in spans:
             down, up = spans[k]
         elif half > NORMAL_95 * FLAT or (abs(z) <= half and _is_one_of_several(model, k)):
             down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
+        elif curved[k]:
+            profile = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
+            down, up = (max(float(half), reach) for reach in profile)
         else:
             down = up = float(half)
         reach = NORMAL_95 * model_error(c, z)
