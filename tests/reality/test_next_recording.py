@@ -9,9 +9,11 @@ import pytest
 from support.concealing import EV3, recorded
 
 from gecar.reality.advise.next_recording import LEAST_DIFFERENCE, LIBRARY, difference, suggest
+from gecar.reality.advise.notes import never_apart
 from gecar.reality.materiality import Size
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
+from gecar.reality.recordings.split import Split
 from gecar.reality.verdict import Found, Limit
 from gecar.world.robot import Robot
 
@@ -77,3 +79,20 @@ def test_the_recording_shows_the_effect_one_asks_about() -> None:
     assert suggested.why.endswith("would show floor_tilt")
     blind = suggest(EV3, (), [], seen_on("none"), NOISE, unexplained=False, about="sensor_lag")
     assert "no sequence of the library shows sensor_lag with these sensors" in blind.why
+
+
+def test_that_motors_may_weaken_each_other_is_said_where_none_was_driven_alone() -> None:
+    flat, run = EV3.with_effects({"supply_voltage": {"scale": 0.97}}), recorded(EV3, 1)
+    together = replace(run, left_duty=np.full(len(run.t_s), 0.4), right_duty=np.full(len(run.t_s), -0.3))
+    (note,) = never_apart(split_of(together), flat)
+    assert "driven alone for 0.0 s" in note
+    assert "supply_voltage" in note
+    assert never_apart(split_of(together), EV3) == []
+    apart = replace(together, right_duty=np.where(run.t_s < 1.2, 0.0, -0.3))
+    assert never_apart(split_of(apart), flat) == []
+    standing = replace(together, left_duty=0.0 * run.t_s, right_duty=0.0 * run.t_s)
+    assert never_apart(split_of(standing), flat) != []
+
+
+def split_of(run: Recording) -> Split:
+    return Split((run,), (), by_time=False)

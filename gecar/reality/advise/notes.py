@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.reality.fitting.model import Step
+from gecar.reality.recordings.recording import Recording
 from gecar.reality.recordings.split import ENOUGH_S, Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
@@ -15,6 +16,12 @@ from gecar.reality.verdict import Invented
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
+LIKE_WEAKENING = (
+    "supply_voltage",
+    "viscous_friction",
+    "clock_skew",
+)  # what motors that weaken each other look like
+APART_S = 1.0  # of one motor driven alone: 1.2 s and more told such motors that lose 2 % from a flat battery, 0.3 s not
 NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
 OR_PATH = ", or the measured path is what is wrong"
 DRIFTS = "its size differs between recordings, times, headings or kinds of motion: it imitates something else"
@@ -84,7 +91,7 @@ def notes_on(
         if split.held and not law.shows
     ]
     notes += _log_faults(split, as_logged or split)
-    notes += battery_at_its_end(found) if found else []
+    notes += [*battery_at_its_end(found), *never_apart(split, found)] if found else []
     if left_out:
         notes.append(LEFT_OUT[left_out])
     notes += [
@@ -157,6 +164,22 @@ def battery_at_its_end(robot: Robot) -> list[str]:
         for field, end in ends.items()
         if "supply_voltage" in robot.effects and end is not None and math.isclose(voltage, end, rel_tol=1e-6)
     ]
+
+
+def never_apart(split: Split, robot: Robot) -> list[str]:
+    """Return a note if what was found may be motors that weaken each other, as one is hardly ever driven alone."""
+    named = [effect for effect in LIKE_WEAKENING if effect in robot.effects]
+    alone_s = sum(_one_alone_s(run) for run in (*split.fitted, *split.held))
+    if not named or alone_s >= APART_S:
+        return []
+    note = f"One motor was driven alone for {alone_s:.1f} s: that each is weaker while the other is driven, too, would"
+    return [f"{note} look like {named[0]}. A drive with one motor at a time tells."]
+
+
+def _one_alone_s(run: Recording) -> float:
+    """Return for how long a recording drives one motor alone [s]."""
+    driven = run.commands[:-1] != 0.0
+    return float(np.diff(run.t_s) @ (driven.any(axis=1) & ~driven.all(axis=1)))
 
 
 def _log_faults(split: Split, as_logged: Split) -> list[str]:
