@@ -189,7 +189,22 @@ def test_slew_ramps_the_duty():
     ramped = with_effect("command_slew", rate_pct_s=100.0)
     history = run(hold(0.5, 0.5, 0.25), ramped)
     assert history["left_duty"][-1] == pytest.approx(0.25)
-    assert history["left_drive"][-1] == pytest.approx(0.25)
+    # what acts in a step that ends at 0.25 s is the mean of one that lies half a step back, from 0.247 to 0.249 s
+    assert history["left_drive"][-1] == pytest.approx(0.248)
+
+
+@pytest.mark.parametrize("rate_pct_s", [700.0, 1431.0, 5300.0, math.inf])
+def test_a_ramp_turns_the_shaft_as_far_whatever_the_step(rate_pct_s):
+    robot = with_effect("command_slew", rate_pct_s=rate_pct_s)
+    coarse, fine = (ramped_angle(robot, dt) for dt in (2e-3, 5e-5))
+    assert coarse == pytest.approx(fine, abs=1e-3)
+
+
+def ramped_angle(robot, dt):
+    """Return how far a shaft turns in 0.3 s [rad], its command as late as commands are: half a step."""
+    duties = hold(0.4, 0.4, 0.3, dt)
+    duties[0] *= 0.5
+    return run(duties, robot, dt)["left_angle"][-1]
 
 
 def test_one_motor_is_stronger():

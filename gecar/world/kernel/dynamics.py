@@ -286,9 +286,8 @@ def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, eff
         if p.regulated != 0.0:
             left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
             right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-        left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
-        right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
-    s.left_duty, s.right_duty = left_duty, right_duty
+        s.left_duty, left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+        s.right_duty, right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
     s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
     s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
     if effects:

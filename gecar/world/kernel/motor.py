@@ -132,9 +132,16 @@ def battery_current(s: Any, p: Any) -> float:
 
 
 @kernel
-def slewed(duty: float, last: float, c: Any) -> float:
-    """Return the duty a ramp of at most ``slew`` per step reaches from the last one."""
-    return min(max(duty, last - c.slew), last + c.slew)
+def slewed(duty: float, last: float, c: Any) -> tuple[float, float]:
+    """Return the duty that a ramp of at most ``slew`` per step reaches from the last one, and the one that acts.
+
+    What acts is the mean over a step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on
+    the way it is the last one. A ramp that acted with what it reaches would be a whole step early.
+    """
+    rise = duty - last
+    if abs(rise) > c.slew:
+        return last + math.copysign(c.slew, rise), last
+    return duty, duty - rise * (abs(rise) / c.slew)
 
 
 @kernel
@@ -186,10 +193,10 @@ def turn_bare_shafts(
     if p.regulated != 0.0:
         left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
         right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-    s.left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
-    s.right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
-    left = effective_duty(s.left_duty, c.left_gain, c.left_dead, p)
-    right = effective_duty(s.right_duty, c.right_gain, c.right_dead, p)
+    s.left_duty, left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+    s.right_duty, right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
+    left = effective_duty(left_duty, c.left_gain, c.left_dead, p)
+    right = effective_duty(right_duty, c.right_gain, c.right_dead, p)
     s.left_drive = within_current(left, s.voltage, s.left_speed, p)
     s.right_drive = within_current(right, s.voltage, s.right_speed, p)
     right_angle = s.right_angle + p.ripple_lead
