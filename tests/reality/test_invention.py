@@ -500,6 +500,15 @@ def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatc
     assert [found.id for found in verdict.effects] == ["viscous_friction"] * material
 
 
+@pytest.mark.parametrize("absent", [True, False])
+def test_an_effect_that_may_as_well_be_absent_beside_a_law_is_not_named(monkeypatch, absent):
+    monkeypatch.setattr(beside, "contains_neutral", lambda *_: absent)
+    verdict = with_rough_bearings(8e-3)
+    assert "yaw_moment" in [law.term.port for law in verdict.invented]
+    assert [found.id for found in verdict.effects] == ["viscous_friction"] * (not absent)
+    assert ("viscous_friction" in verdict.robot.effects) is not absent
+
+
 @pytest.mark.parametrize("waxing", [0.0, 0.1], ids=["darker", "flickers"])
 def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
     language, runs = parse_grammar("<t> ::= colour_reading: c * 1 | yaw_moment: c * 1"), []

@@ -27,6 +27,7 @@ from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
 from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
+from gecar.reality.uncertainty.intervals import contains_neutral, intervals
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -139,6 +140,19 @@ def pruned(written: Written, first: Explanation) -> Written:
         stays = without.cost - here.cost >= PRICE
         if not (stays and (problem.on_bench or is_material(problem, here, step))):
             written = written_with(written, first, without, problem)
+    return written
+
+
+def without_absent(written: Written, first: Explanation, seed: int) -> Written:
+    """Drop, one by one, the effects that may as well be absent beside the laws, as their interval says."""
+    while written.explained.steps:
+        here = written.explained
+        spans = intervals(here.problem.estimator, here.taken, seed)
+        absent = [step for step in here.steps if contains_neutral(here.taken, step.effect, spans)]
+        if not absent:
+            break
+        weakest = min(absent, key=lambda step: step.gain)
+        written = _refitted(written, first, fitted_without(written, first, weakest))
     return written
 
 

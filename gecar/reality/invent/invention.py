@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from gecar.language.grammar import Grammar
 from gecar.reality.fitting.model import Step
-from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects
+from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects, without_absent
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key, looking_at, single_laws
@@ -130,7 +130,10 @@ def invent(
         first = replace(first, steps=written.explained.steps)
         if not written.explained.unexplained:
             break
-    return replace(written, invented=with_constants_of(written, first)) if written.terms else written
+    if not written.terms:
+        return written
+    written = without_absent(written, first, seed)
+    return replace(written, invented=with_constants_of(written, first))
 
 
 def of_both_wheels(explained: Explanation, grammar: Grammar) -> tuple[Grammar, list[Step]] | None:
