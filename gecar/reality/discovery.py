@@ -23,7 +23,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.beside import lessened
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
-from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_wheels
+from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
@@ -312,7 +312,7 @@ def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _S
 def _motion(context: _Context, problem: Problem, held: Residuals) -> _Stage:
     """Explain the motion by effects, keep those that are confirmed, and add laws."""
     motion = _with_intervals(context, explained_and_confirmed(problem, held), held)
-    return _with_laws(context, _with_law_of_both_wheels(context, motion))
+    return _with_laws(context, _with_law_of_both_motors(context, motion))
 
 
 def _explained_without(
@@ -379,13 +379,13 @@ def _explain_sensor(
     return _with_laws(context, _with_intervals(context, seen, beside))
 
 
-def _with_law_of_both_wheels(context: _Context, stage: _Stage) -> _Stage:
-    """Add a law of what the other wheel does, or put it in the place of effects, where it explains more than they do.
+def _with_law_of_both_motors(context: _Context, stage: _Stage) -> _Stage:
+    """Add a law of what the other motor is told, or put it in the place of effects, where it explains more.
 
     What no effect is like may leave less than is material beside one that imitates it.
     """
     found = (
-        of_both_wheels(stage.explained, context.language)
+        of_both_motors(stage.explained, context.language)
         if context.language and stage.explained.steps
         else None
     )
@@ -404,12 +404,14 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     They are wanted where what is left is material, and where it stands far out of what changes of the robot's constants
     could be; there they must be material themselves. Effects may imitate what no list holds: if what is left beside
     laws still asks for laws, they are written in the place of the effects that they lessen, too (of all if there are no
-    laws), and taken if they leave far less, or no more and explain far more.
+    laws), and taken if they leave far less, or no more and explain far more. Effects that are all named again beside
+    them stood in for nothing.
     """
     if context.language is None or not (context.invents or _is_left(stage)):
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
-    if not (context.invents or stage.explained.unexplained or _is_material(beside, stage)):
+    of_any_size = context.invents or stage.explained.unexplained
+    if not (of_any_size or _is_material(beside, stage)):
         beside = stage
     if not _is_left(beside):
         return beside
@@ -421,6 +423,9 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
     context.tell(f"laws in the place of {', '.join(step.effect for step in doubtful)}")
     bare = _without(stage.explained, doubtful)
     alone = _with_laws_on(context, context.language, replace(stage, spans={}), bare)
+    again = {step.effect for step in doubtful} <= set(alone.explained.taken.effects)
+    if again or not (of_any_size or _is_material(alone, stage)):
+        return beside
     gains = [_gain(bare, each) for each in (beside, alone)]
     far_less = _left(alone) < INSTEAD * _left(beside)
     far_more = max(_left(alone), 1.0) <= max(_left(beside), 1.0) and gains[0] < INSTEAD * gains[1]

@@ -320,6 +320,23 @@ def test_laws_that_leave_as_much_must_explain_far_more(monkeypatch, gained, stay
     assert (bool(verdict.effects), bool(verdict.invented)) == (stays, not stays)
 
 
+@pytest.mark.usefixtures("hidden_by_effects")
+@pytest.mark.parametrize("again", [True, False])
+def test_effects_that_are_all_named_again_beside_laws_stood_in_for_nothing(monkeypatch, again):
+    written, named = discovery._with_laws_on, []
+
+    def with_effects_again(context, language, stage, explained):
+        found = written(context, language, stage, explained)
+        named.append(explained)
+        return replace(found, explained=named[0]) if again else found
+
+    monkeypatch.setattr(discovery, "_with_laws_on", with_effects_again)
+    monkeypatch.setattr(discovery, "_left", lambda stage: 2.0)
+    monkeypatch.setattr(discovery, "_gain", lambda bare, stage: 100.0 if stage.laws else 10.0)
+    verdict = late_and_imitated(language=WHEELS_AND_LAG, invents=True)
+    assert (verdict.effects != (), verdict.invented == ()) == (again, again)
+
+
 OVAL = parse_grammar(
     """
     <term> ::= rolling_radius: <r> | rolling_radius: <r> + <r> | motor_torque: c * speed
@@ -403,7 +420,7 @@ def test_motors_that_weaken_each_other_have_a_law_and_no_flat_battery():
     assert [effect.id for effect in verdict_on_weak_motors(None, *WEAKER_TOGETHER).effects] != []
 
 
-def test_a_flat_battery_is_named_beside_laws_of_the_other_wheel():
+def test_a_flat_battery_is_named_beside_laws_of_both_motors():
     found = verdict_on_weak_motors(WITH_THE_OTHER)
     assert [effect.id for effect in found.effects] == ["supply_voltage"]
     assert found.invented == ()
@@ -746,12 +763,12 @@ def test_what_a_law_looks_like(table, words):
     assert words in looks_like(Term(**table))
 
 
-def test_laws_of_the_other_wheel_are_those_that_look_at_it():
-    language = looking_at(physics_grammar(), invention.OF_OTHER)
+def test_laws_of_both_motors_are_those_that_look_at_what_the_other_is_told():
+    language = looking_at(physics_grammar(), invention.OF_BOTH_MOTORS)
     laws = [law for law, *_ in single_laws(language)]
-    assert {law.port for law in laws} == {"command", "motor_torque"}
-    assert all(invention.OF_OTHER & set(law.parsed.variables) for law in laws)
-    assert looking_at(FEW, invention.OF_OTHER) is None
+    assert {law.port for law in laws} == {"command"}
+    assert all("other_command" in law.parsed.variables for law in laws)
+    assert looking_at(FEW, invention.OF_BOTH_MOTORS) is None
 
 
 def test_the_laws_elsewhere_are_those_at_other_ports():

@@ -45,12 +45,12 @@ TRIED = 5  # of the best laws, until one is proved
 HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of noise: with it they must part by less
 MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
-OF_OTHER = frozenset(
-    ("other_angle", "other_speed", "other_command")
-)  # variables of a wheel's law: the other's state
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
-OF_PAIR = OF_OTHER | {"side"}  # and that one motor alone has not
+OF_PAIR = frozenset(
+    ("side", "other_angle", "other_speed", "other_command")
+)  # and that one motor alone has not
+OF_BOTH_MOTORS = frozenset(("other_command",))  # variable of laws that act while both are driven
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
@@ -136,13 +136,14 @@ def invent(
     return replace(written, invented=with_constants_of(written, first))
 
 
-def of_both_wheels(explained: Explanation, grammar: Grammar) -> tuple[Grammar, list[Step]] | None:
-    """Return a language of laws of what the other wheel does, and the effects that the best of them stands for.
+def of_both_motors(explained: Explanation, grammar: Grammar) -> tuple[Grammar, list[Step]] | None:
+    """Return a language of laws of what the other motor is told, and the effects that the best of them stands for.
 
     None if no such law explains more than effects did. But for the battery's load no effect of the catalogue is of both
-    wheels together: what is imitates a flat battery, a clock or friction.
+    motors together: what is, imitates a flat battery, a clock or friction. Laws of how the other wheel turns wait for
+    what is left: axles that rub would stand in for oval wheels.
     """
-    language = None if explained.problem.on_bench else looking_at(grammar, OF_OTHER)
+    language = None if explained.problem.on_bench else looking_at(grammar, OF_BOTH_MOTORS)
     if language is None:
         return None
     first = replace(explained, taken=explained.problem.estimator.at(explained.taken, explained.taken.z))
