@@ -256,7 +256,7 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("supply_scale", "scale", "-", 0.5, 1.3, 1.0, 0.005, differs=0.08),),
            ("motor",), "all speeds", "6.0-9.0 V over an EV3 battery's charge; bounds: the robot's battery"),
     Effect("battery_resistance", "the battery's voltage sags under load",
-           (_P("battery_resistance", "resistance_ohm", "ohm", 0.0, 4.0, None, 0.1),),
+           (_P("battery_resistance", "resistance_ohm", "ohm", 0.0, 4.0, None, 0.1, model_error=0.05),),
            ("motor",), "acceleration, stall; both motors couple", "battery as a source behind a resistance"),
     Effect("battery_drain", "the battery's voltage falls over time",
            (_P("battery_drain", "rate_v_s", "V/s", -0.02, 0.3, 0.0, 0.004),),
