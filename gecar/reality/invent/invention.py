@@ -47,10 +47,8 @@ MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
-OF_PAIR = frozenset(
-    ("side", "other_angle", "other_speed", "other_command")
-)  # and that one motor alone has not
-OF_BOTH_MOTORS = frozenset(("other_command",))  # variable of laws that act while both are driven
+OF_BOTH_MOTORS = frozenset(("other_command",))  # of laws that act while both are driven
+OF_PAIR = OF_BOTH_MOTORS | {"side", "other_angle", "other_speed"}  # and that one motor alone has not
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
