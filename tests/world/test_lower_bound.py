@@ -102,6 +102,15 @@ def test_a_regulator_that_saturates_starts_no_earlier_than_the_bound_allows(dt):
         assert max(beyond_the_bound(robot, [(-1.0, -1.0)], seconds, dt)) <= 0.0
 
 
+@pytest.mark.parametrize("dt", [0.0005, 0.002, 0.01])
+@pytest.mark.parametrize("seconds", [0.05, 0.3, 1.0, 3.0])
+def test_a_torque_that_waits_for_no_command_acts_no_earlier_than_the_bound_allows(seconds, dt):
+    robot = EV3.with_effects(
+        {"coulomb_friction": {"torque_nm": 0.0}, "constant_torque": {"torque_nm": -0.12}}
+    )
+    assert max(beyond_the_bound(robot, [(-1.0, -1.0)], seconds, dt)) <= 0.0
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_nor_do_random_commands_with_several_effects(data):

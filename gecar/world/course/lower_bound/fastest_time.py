@@ -89,9 +89,9 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
     free = push > 0.0 or unlike > 0.0
     holding = _holding(p, tilt)
     dead = 0.0 if free else max(p["actuation_delay"], p["start_latency"])
-    # A saturated regulator hides the half step that commands wait for velocities, and a curve that gives more than half
-    # at half duty part of it: the robot starts that much early.
-    early = 0.5 * _LONGEST_STEP_S if p["regulated"] or p["duty_bulge"] > 0.0 else 0.0
+    # A saturated regulator hides the half step that commands wait for velocities, a curve that gives more than half at
+    # half duty part of it, and what pushes without a command does not wait: the robot starts that much early.
+    early = 0.5 * _LONGEST_STEP_S if p["regulated"] or p["duty_bulge"] > 0.0 or push > 0.0 else 0.0
     return Sprint(
         float(speed),
         math.inf if free else float(large * p["speed_limit"] * (1.0 + over)),
