@@ -380,15 +380,13 @@ def _explain_sensor(
 
 
 def _with_law_of_both_motors(context: _Context, stage: _Stage) -> _Stage:
-    """Add a law of what the other motor is told, or put it in the place of effects, where it explains more.
+    """Add a law that uses the other motor's command, or put it in the place of effects, where it explains more.
 
     What no effect is like may leave less than is material beside one that imitates it.
     """
-    found = (
-        of_both_motors(stage.explained, context.language)
-        if context.language and stage.explained.steps
-        else None
-    )
+    if context.language is None or not stage.explained.steps:
+        return stage
+    found = of_both_motors(stage.explained, context.language)
     if found is None:
         return stage
     language, imitations = found
@@ -453,7 +451,7 @@ def _is_left(stage: _Stage) -> bool:
 
 
 def _is_material(stage: _Stage, before: _Stage) -> bool:
-    """Whether one of a stage's further laws moves the robot, or changes a reading, by a material amount."""
+    """Whether a law added since the stage before moves the robot, or changes a reading, by a material amount."""
     material = stage.explained.problem.material
     return any(material.times(law.size) >= 1.0 for law in stage.invented[len(before.invented) :])
 

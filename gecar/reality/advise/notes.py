@@ -17,7 +17,7 @@ from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
 LIKE_WEAKENING = "supply_voltage", "viscous_friction", "clock_skew"
-"""Effects that motors that weaken each other look like."""
+"""Effects that motors which weaken each other are mistaken for."""
 APART_S = 1.0  # of one motor driven alone: 1.2 s and more told such motors that lose 2 % from a flat battery, 0.3 s not
 NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
 OR_PATH = ", or the measured path is what is wrong"

@@ -25,6 +25,7 @@ from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key, looking_at, single_laws
 from gecar.reality.invent.states import Physics, ranges, states
 from gecar.reality.invent.written import Written, added, with_constants_of
+from gecar.reality.materiality import Size
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, gaps
 from gecar.reality.residuals.of_case import Residuals
@@ -100,9 +101,7 @@ def invent(
     refused
         Effects that were taken and are no findings: they may be beside a law, and a law may only hold beside them.
     """
-    ports, problem = _ports(explained.problem), explained.problem
-    known = problem.estimator.at(explained.taken, explained.taken.z)  # whitened as this problem has it
-    first = replace(explained, taken=known)
+    ports, problem, first = _ports(explained.problem), explained.problem, _as_whitened(explained)
     written = Written(first, (), ())
     for number in range(MOST_LAWS):
         here = written.explained
@@ -135,7 +134,7 @@ def invent(
 
 
 def of_both_motors(explained: Explanation, grammar: Grammar) -> tuple[Grammar, list[Step]] | None:
-    """Return a language of laws of what the other motor is told, and the effects that the best of them stands for.
+    """Return the laws that use the other motor's command, as a language, and the effects that the best one replaces.
 
     None if no such law explains more than effects did. But for the battery's load no effect of the catalogue is of both
     motors together: what is, imitates a flat battery, a clock or friction. Laws of how the other wheel turns wait for
@@ -144,7 +143,7 @@ def of_both_motors(explained: Explanation, grammar: Grammar) -> tuple[Grammar, l
     language = None if explained.problem.on_bench else looking_at(grammar, OF_BOTH_MOTORS)
     if language is None:
         return None
-    first = replace(explained, taken=explained.problem.estimator.at(explained.taken, explained.taken.z))
+    first = _as_whitened(explained)
     library = Library(first.problem, first.taken)
     best = max(single_laws(language), key=library.gain)
     if library.gain(best) < PRICE:
@@ -152,6 +151,11 @@ def of_both_motors(explained: Explanation, grammar: Grammar) -> tuple[Grammar, l
     law = fit(library, library.started(best))
     beside = pruned(added(Written(first, (), ()), first, library, law), first).explained.taken.effects
     return language, [step for step in explained.steps if step.effect not in beside]
+
+
+def _as_whitened(explained: Explanation) -> Explanation:
+    """Return an explanation whose model has its residuals whitened as its problem has them."""
+    return replace(explained, taken=explained.problem.estimator.at(explained.taken, explained.taken.z))
 
 
 def _ports(problem: Problem) -> list[str]:
@@ -286,21 +290,19 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     """
     if not held.recordings:
         return 0.0
-    both = before, after
-    filmed = [e.problem.with_its_camera(held, e.taken.physics) for e in both]
-    plain = [seen.errors(e.taken.physics) for seen, e in zip(filmed, both, strict=True)]
+    filmed = [(e, e.problem.with_its_camera(held, e.taken.physics)) for e in (before, after)]
+    plain = [seen.errors(e.taken.physics) for e, seen in filmed]
     if np.sum((plain[0] - plain[1]) ** 2) < LEAST_SHOWN:
         return 0.0
-    beside = [
-        seen.errors(e.problem.with_small_changes(e.taken)) for seen, e in zip(filmed, both, strict=True)
-    ]
+    beside = [seen.errors(e.problem.with_small_changes(e.taken)) for e, seen in filmed]
     shares = [(share_asked_for(held.index, *errors), errors) for errors in (plain, beside)]
     share, (without, having) = max(shares, key=lambda each: each[0].margin)
     gain = cost(without) - cost(having)
     if gain <= 0.0 or share.margin <= 0.0:
         return None
-    robots = (e.problem.estimator.robot.with_effects(e.taken.values) for e in both)
-    was, now = gaps(*(Contender(robot, seen) for robot, seen in zip(robots, filmed, strict=True)))
+    was, now = gaps(
+        *(Contender(e.problem.estimator.robot.with_effects(e.taken.values), seen) for e, seen in filmed)
+    )
     return gain if now < (1.0 if share.is_whole else HELPS) * was else None
 
 
@@ -317,7 +319,7 @@ def _indistinguishable(law: Law, found: Sequence[Law]) -> list[Law]:
 def _told(
     library: Library, law: Law, others: Sequence[Law], proof: Proof, held_gain: float
 ) -> list[Invented]:
-    """Return what the verdict says of each term of a law, but for its constants and the words that tell them."""
+    """Return what the verdict says of each term of a law, but for its constants, its size and its words."""
     problem, physics = library.problem, law.parameters.physics(law.minimum.z)
     return [
         Invented(
@@ -331,7 +333,7 @@ def _told(
             p=proof.p,
             spread=_spread(library, law),
             range=ranges(term, problem.residuals.recordings, physics),
-            size=problem.sizes.apart(physics, library.model.physics),
+            size=Size(),
         )
         for term in law.terms
     ]

@@ -36,6 +36,7 @@ from gecar.reality.invent.sentences import (
     pieces,
     read_sentence,
     single_laws,
+    variables_of,
 )
 from gecar.reality.optimisation.least_squares import Minimum, least_squares, weights
 from gecar.reality.selection.problem import Problem
@@ -257,7 +258,7 @@ def search(
     """
     room = N_TERMS - len(library.problem.estimator.robot.term)
     there = at_ports(grammar, ports, room)
-    singles = [laws for laws in single_laws(there) if not _variables(laws) & unknown]
+    singles = [laws for laws in single_laws(there) if not variables_of(laws) & unknown]
     if not singles:
         return []
     tell(f"{len(singles)} laws one by one")
@@ -380,12 +381,6 @@ def _sum(parts: Sequence[Term]) -> Term | None:
         return None
 
 
-def _variables(laws: Laws) -> set[str]:
-    """Return what laws look at; one of a single wheel looks at the side."""
-    sides = {"side" for term in laws if term.side != "both"}
-    return sides.union(*(term.parsed.variables for term in laws))
-
-
 class _Evolved(EvolvedProblem[Laws]):
     """Laws as what an evolution evolves: the sentences of a grammar, less those of unknown variables."""
 
@@ -399,7 +394,7 @@ class _Evolved(EvolvedProblem[Laws]):
         except ValueError:
             return None
         parts = [key((part,)) for part in parts_of(laws)]
-        return None if _variables(laws) & self._unknown or len(set(parts)) < len(parts) else laws
+        return None if variables_of(laws) & self._unknown or len(set(parts)) < len(parts) else laws
 
     def meaning(self, program: Laws, derivation: Derivation) -> bytes:  # noqa: ARG002
         """Return the laws as bytes."""

@@ -167,6 +167,12 @@ def _key(part: Term) -> str:
     return f"{part.port} {part.side} {' * '.join(sorted(formula.split(' * ')))} {part.store} {part.store_s} {point}"
 
 
+def variables_of(laws: Laws) -> set[str]:
+    """Return what laws look at; one of a single wheel looks at the side."""
+    sides = {"side" for term in laws if term.side != "both"}
+    return sides.union(*(term.parsed.variables for term in laws))
+
+
 def single_laws(grammar: Grammar) -> list[Laws]:
     """Return all short laws of one part, each once; a law for each wheel may have two parts on either."""
     read = (read_sentence(sentence) for sentence in sentences(grammar, SINGLE))
@@ -220,17 +226,19 @@ def elsewhere(grammar: Grammar, ports: Sequence[str]) -> Grammar | None:
 
 
 def looking_at(grammar: Grammar, variables: frozenset[str]) -> Grammar | None:
-    """Return a grammar of the start's alternatives whose first law looks at some variables; None if there is none."""
-    firsts = (_first(grammar, number) for number in range(len(grammar.rules[0].productions)))
-    looks = [variables & {v for term in read_sentence(law) for v in term.parsed.variables} for law in firsts]
-    numbers = [number for number, seen in enumerate(looks) if seen]
+    """Return the part of a grammar whose first laws use any of some variables; None if there is none."""
+    numbers = [k for k, law in enumerate(_firsts(grammar)) if variables & variables_of(read_sentence(law))]
     return _only(grammar, numbers) if numbers else None
 
 
 def _ports_of(grammar: Grammar) -> list[set[str]]:
     """Return the ports of each of the start's alternatives."""
-    firsts = (_first(grammar, number) for number in range(len(grammar.rules[0].productions)))
-    return [{name.strip() for name in first.partition(":")[0].split(" and ")} for first in firsts]
+    return [{name.strip() for name in first.partition(":")[0].split(" and ")} for first in _firsts(grammar)]
+
+
+def _firsts(grammar: Grammar) -> list[str]:
+    """Return the first short sentence of each of the start's alternatives."""
+    return [_first(grammar, number) for number in range(len(grammar.rules[0].productions))]
 
 
 def _first(grammar: Grammar, number: int) -> str:

@@ -157,7 +157,7 @@ def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, .
 
 
 def _as_written(law: Invented, term: Term, written: Written) -> Invented:
-    """Return what is said of a law: of its variables where it was tested, and what it does to the robot as it is now.
+    """Return a law's entry with the ranges of the variables it still uses, and with what it does to the robot now.
 
     When it was added it may have taken the place of an effect, and have changed little.
     """

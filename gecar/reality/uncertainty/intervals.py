@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -109,12 +110,17 @@ def _is_one_of_several(model: Model, k: int) -> bool:
 
 
 def _in_a_valley(model: Model, slopes: Array) -> list[bool]:
-    """Return of each coordinate whether recordings hardly tell it from another of the same effect."""
+    """Return, for each coordinate, whether it can hardly be told from another one of the same effect."""
     w, effects = weights(model.errors), np.array([c.effect.id for c in model.parameters.coordinates])
     inverse = np.linalg.pinv(slopes.T @ (w[:, None] * slopes), hermitian=True)
-    sd = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
-    alike = (np.abs(inverse / np.outer(sd, sd)) > ALIKE) & (effects[:, None] == effects)
-    return (alike.sum(axis=1) > 1).tolist()
+    return ((alike(inverse) & (effects[:, None] == effects)).sum(axis=1) > 1).tolist()
+
+
+def alike(covariance: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.bool_]:
+    """Return which estimates are correlated by more than `ALIKE`, each with itself too, shape (k, k)."""
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    out: npt.NDArray[np.bool_] = np.abs(covariance / np.outer(deviation, deviation)) > ALIKE
+    return out
 
 
 def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, dict[str, Interval]]:

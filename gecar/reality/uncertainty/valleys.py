@@ -20,8 +20,8 @@ import numpy as np
 from gecar.reality.fitting.model import Model
 from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.selection.problem import Problem, small_sensitivities, unnamed
-from gecar.reality.selection.thresholds import ALIKE, UNNAMED
-from gecar.reality.uncertainty.intervals import half_widths
+from gecar.reality.selection.thresholds import UNNAMED
+from gecar.reality.uncertainty.intervals import alike, half_widths
 from gecar.reality.verdict import Interval
 
 Spans = Mapping[str, Mapping[str, Interval]]
@@ -60,9 +60,7 @@ def valleys(problem: Problem, model: Model) -> tuple[tuple[str, ...], ...]:
     columns = np.concatenate(list(slopes.values()), axis=1) * np.sqrt(weights(model.errors))[:, None]
     prior = [0.0 if name in model.effects else UNNAMED**-2 for name in names]
     covariance = np.linalg.pinv(columns.T @ columns + np.diag(prior), hermitian=True)
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    alike = np.abs(covariance / np.outer(deviation, deviation)) > ALIKE
-    return tuple(dict.fromkeys(_sets(names, alike, model)))
+    return tuple(dict.fromkeys(_sets(names, alike(covariance), model)))
 
 
 def _sets(names: list[str], alike: np.ndarray, model: Model) -> Iterator[tuple[str, ...]]:

@@ -133,7 +133,7 @@ def battery_current(s: Any, p: Any) -> float:
 
 @kernel
 def slewed(duty: float, last: float, c: Any) -> tuple[float, float]:
-    """Return the duty that a ramp of at most ``slew`` per step reaches from the last one, and the one that acts.
+    """Return the duty that a ramp reaches in a step, ``slew`` from the last one at most, and the mean that acts in it.
 
     What acts is the mean over a step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on
     the way it is the last one. A ramp that acted with what it reaches would be a whole step early.
