@@ -32,8 +32,8 @@ from gecar.world.rollout import World, simulate
 pytest.importorskip("pymoo", reason="needs pip install 'gecar[goals]'")
 pytest.importorskip("ribs", reason="needs pip install 'gecar[goals]'")
 
-FOLLOWER = "if(SensorValue > 85):\n    motor(80,80,20)\nelse:\n    motor(50,-60,10)\n"
-"""Reaches GOAL on the paper's course in 14.28 s."""
+FOLLOWER = "if(SensorValue > 90):\n    motor(70,80,10)\nelse:\n    motor(50,-60,10)\n"
+"""Reaches GOAL on the paper's course in 17.35 s, in 17.38 to 17.35 s at other steps."""
 TINY = ("--population", 20, "--generations", 3, "--draws", 1, "--workers", 1, "--quiet")
 SMALL = {"population": 20, "generations": 4, "draws": 1}
 
@@ -108,7 +108,7 @@ def test_every_program_of_a_front_can_be_driven_and_exported(name: str, gecar, t
     words = ("--goals", "time,energy,length", "--start-from", "known.txt", "--time-limit", 40, "--out", "run")
     ended = gecar("evolve", "--preset", name, *words, *TINY, "--json")
     points = read_front(tmp_path / "run")
-    assert points[0].time_s < 14.29
+    assert points[0].time_s < 17.36
     assert [point._asdict() for point in points] == ended.json["front"]
     assert (tmp_path / "run/front.png").stat().st_size > 10_000
     for point in points[:3]:

@@ -29,10 +29,12 @@ def test_what_a_search_over_places_cycles_and_limits_finds_in_noise_is_no_surpri
     monkeypatch.setattr("gecar.reality.selection.screening.NEGLIGIBLE", -1.0)
     monkeypatch.setattr("gecar.reality.fitting.initial_values.LEAST_GAIN", -1.0)
     p = []
-    for seed in range(4):
+    for seed in range(8):
         problem = of_noise(effect, seed)
         nulls = largest_gains(problem.estimator, problem.catalogue, problem.known)
         gain = max(step.gain for step in candidate_steps(problem, problem.known))
         assert np.quantile(nulls, 0.95) > 0.0
         p.append(np.mean(nulls >= gain))
-    assert min(p) > 0.05 / 4
+    # of eight that are even between 0 and 1 three are as small in 0.6 % of all cases
+    assert np.sum(np.array(p) < 0.05) <= 2
+    assert np.median(p) > 0.1

@@ -74,7 +74,7 @@ def test_a_start_nothing_tells_is_not_told() -> None:
 
 @pytest.mark.parametrize("wheels", [(0.0, 0.015, 0.0), (0.01, 0.0, 0.0), (0.0, 0.0, 0.05)])
 def test_dead_reckoning_with_wrong_wheels_is_seen_through(wheels: tuple[float, float, float]) -> None:
-    run = trial("made", EV3, posed=False)
+    run = trial("made", EV3, SPINS, posed=False)
     found = whereabouts(run, with_other_wheels(reckoned(run), np.array([0.0, 0.0, 0.0, *wheels])))
     assert found is None
 

@@ -27,6 +27,26 @@ def _circled(push, side, circle, slide_push, slide_side):
     return slide_push * scale, slide_side * scale, True
 
 
+def _owed(before, after, friction, budget, load):
+    way = math.copysign(1.0, before)
+    if after * way > 0.0 and friction == -way * budget:
+        return 0.0
+    had = abs(before) * load
+    slows = had + way * (friction - after * load)
+    if slows + budget <= had:
+        return -way * budget - friction
+    return way * min(budget - slows, 0.0) * (1.0 - had / (slows + budget)) - after * load
+
+
+def _repaid(free, before, stood, due, dry, rotor):
+    pull = (free - before) * rotor
+    if stood:
+        starts = pull * due > 0.0 and abs(pull) > max(dry, abs(due))
+        lost = abs(due) * (1.0 - dry / abs(pull)) - max(abs(due) - dry, 0.0) if starts else 0.0
+        return free + math.copysign(lost, due) * (1.0 / rotor), pull if before == 0.0 else 0.0
+    return free + due * (1.0 / rotor), pull if before == 0.0 and due == 0.0 else 0.0
+
+
 def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold against the kernel
     """Return the centre of mass and the left shaft's angle after every step, three arrays of shape (steps,)."""
     body, motor = robot.body, robot.motor
@@ -42,19 +62,23 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
     m_side, m_ss = cross * (both + own) / det, (own * own - both * both) / det
     alone = own * aside - cross * cross
     n_own, n_side, n_ss = aside / alone, cross / alone, own / alone
+    load = rotor / (1.0 - m_own * r * r * inv_j)
     slides_l = slides_r = False
     weight, gain = body.mass * GRAVITY, DT * motor.torque_constant / (rotor * motor.resistance)
     dry, voltage, mass_w = motor.coulomb_friction * DT, robot.battery.voltage, 1.0 / own
     caster_static = weight * body.com_ahead / body.caster_ahead
     cos, sin, x, y, heading = 1.0, 0.0, body.com_ahead, 0.0, 0.0
     vx = vy = yaw = wl = wr = left = 0.0
-    pl = pr = ql = qr = 0.0
+    pl = pr = ql = qr = was_l = was_r = due_l = due_r = known = 0.0
     out = np.empty((3, len(duties)))
     for n, (dl, dr) in enumerate(duties):
         half = 0.5 * DT * yaw
         cos, sin = _turned(cos, sin, half)
         u, w = vx * cos + vy * sin, vy * cos - vx * sin
-        wl, wr = keep * wl + gain * dl * voltage, keep * wr + gain * dr * voltage
+        stood_l, stood_r, was_l, was_r = was_l == 0.0, was_r == 0.0, wl, wr
+        wl, due_l = _repaid(keep * wl + gain * dl * voltage, was_l, stood_l, due_l, known, rotor)
+        wr, due_r = _repaid(keep * wr + gain * dr * voltage, was_r, stood_r, due_r, known, rotor)
+        known = dry
         caster = min(
             max(caster_static + (pl + pr) * (1.0 / DT) * (-body.com_height / body.caster_ahead), 0.0), weight
         )
@@ -90,6 +114,10 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
             if settled and not slides_l and not slides_r:
                 break
         u, w, yaw, wl, wr = (v if abs(v) > 1e-15 else 0.0 for v in (u, w, yaw, wl, wr))
+        if was_l != 0.0:
+            due_l = _owed(was_l, wl, fl, dry, load if pl != 0.0 and not slides_l else rotor)
+        if was_r != 0.0:
+            due_r = _owed(was_r, wr, fr, dry, load if pr != 0.0 and not slides_r else rotor)
         left += wl * DT
         vx, vy = u * cos - w * sin, u * sin + w * cos
         x, y, heading = x + vx * DT, y + vy * DT, heading + yaw * DT

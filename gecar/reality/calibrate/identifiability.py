@@ -17,8 +17,9 @@ from gecar.reality.residuals.of_case import Residuals
 Array = npt.NDArray[np.float64]
 
 PROBE = 0.4  # of a step, for differences
-# A constant whose effect is that of others to within this sine of an angle cannot be identified.
-LEAST_SINE = 0.1
+# A constant whose effect is that of others to within this sine of an angle cannot be identified: derivatives at steps
+# of 2 ms are off by 0.02.
+LEAST_SINE = 0.05
 # Nor is one worth a number whose interval reaches further than so many of its steps either way.
 WIDEST_STEPS = 25.0
 BLIND = "nothing in these recordings depends on it"

@@ -43,7 +43,7 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
     bool
         Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
     """
-    settled = _rub_shafts(s, c)
+    settled = rub_shafts(s, c)
     sliding = _roll(s, c, effects)
     if terms and c.apart != 0.0:
         _scrub(s, c)
@@ -55,7 +55,7 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
 
 
 @kernel
-def _rub_shafts(s: Any, c: Any) -> bool:
+def rub_shafts(s: Any, c: Any) -> bool:
     """Give each shaft the friction impulse that would stop it, within its budget.
 
     Returns

@@ -19,22 +19,17 @@ from gecar.compiled import blank, kernel, subroutine
 from gecar.world.kernel.contacts import release_contacts, sweep
 from gecar.world.kernel.laws import SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.motor import (
-    awake,
     battery_current,
-    conduct,
-    effective_duty,
     friction_budget,
-    regulate,
-    slewed,
+    owe,
+    run_motors,
     supply,
     turn_bare_shafts,
-    within_current,
+    unless_still,
 )
 from gecar.world.kernel.series import small_cosine, small_sine
 from gecar.world.kernel.state import roll_on
 from gecar.world.kernel.terms import ask, look_at
-
-STILL = 1e-15  # m/s and rad/s
 
 _EFFECT_FIELDS = (
     "tilt_x", "tilt_y", "regulated", "start_latency", "dead_band", "direction_gain",
@@ -101,7 +96,7 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
     """
     enter_step(s, c, effects)
     s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
-    _run_motors(s, left_duty, right_duty, p, c, effects)
+    run_motors(s, left_duty, right_duty, 0.0, 0.0, p, c, effects)
     _set_budgets(s, p, c, effects)
     release_contacts(s)
     return sweep(s, c, effects)
@@ -163,9 +158,8 @@ def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, 
     """Begin a step that was entered, as `begin_step` does, with what terms ask for, but for the robot's shape."""
     _force(s, asked, c)
     s.voltage = supply(s, p) + asked.supply_voltage
-    _run_motors(s, left_duty + asked.left_command, right_duty + asked.right_command, p, c, True)
-    s.left_speed += asked.left_motor_torque * c.dt * c.inv_rotor
-    s.right_speed += asked.right_motor_torque * c.dt * c.inv_rotor
+    left, right = left_duty + asked.left_command, right_duty + asked.right_command
+    run_motors(s, left, right, asked.left_motor_torque, asked.right_motor_torque, p, c, True)
     _set_budgets(s, p, c, True)
     s.left_dry = max(s.left_dry + asked.left_gear_friction * c.dt, 0.0)
     s.right_dry = max(s.right_dry + asked.right_gear_friction * c.dt, 0.0)
@@ -243,7 +237,13 @@ def enter_step(s: Any, c: Any, effects: bool) -> None:
 @kernel
 def end_step(s: Any, p: Any, c: Any, effects: bool) -> None:
     """End a step: what the contacts left of the velocities moves the shafts; `drift` then moves the body."""
-    _settle(s)
+    s.u, s.w, s.yaw_rate = unless_still(s.u), unless_still(s.w), unless_still(s.yaw_rate)
+    s.left_speed, s.right_speed = unless_still(s.left_speed), unless_still(s.right_speed)
+    owe(
+        s,
+        c.left_load if s.left_push != 0.0 and s.left_slides == 0.0 else c.rotor,
+        c.right_load if s.right_push != 0.0 and s.right_slides == 0.0 else c.rotor,
+    )
     s.left_angle += s.left_speed * c.dt
     s.right_angle += s.right_speed * c.dt
     if effects:
@@ -277,25 +277,6 @@ def turn(s: Any, angle: float) -> None:
     c, n = s.cos, s.sin
     s.cos = c * cosine - n * sine
     s.sin = n * cosine + c * sine
-
-
-@kernel
-def _run_motors(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effects: bool) -> None:
-    """Turn commands into the shafts' free speeds, at the step's voltage."""
-    if effects:
-        if p.regulated != 0.0:
-            left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
-            right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-        s.left_duty, left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
-        s.right_duty, right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
-    s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
-    s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
-    if effects:
-        s.left_drive = within_current(s.left_drive, s.voltage, s.left_speed, p)
-        s.right_drive = within_current(s.right_drive, s.voltage, s.right_speed, p)
-    s.left_speed = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, effects)
-    right_angle = s.right_angle + p.ripple_lead
-    s.right_speed = conduct(s.right_drive, s.voltage, right_angle, s.right_speed, p, c, effects)
 
 
 @kernel
@@ -334,16 +315,6 @@ def _grip(s: Any, p: Any) -> float:
         if dx * dx + dy * dy < p.patch_radius * p.patch_radius:
             return p.patch_friction
     return p.tyre_friction
-
-
-@kernel
-def _settle(s: Any) -> None:
-    """End motion too slow to matter: sticking leaves ever smaller speeds, and denormal numbers cost 50 times more."""
-    s.u = s.u if abs(s.u) > STILL else 0.0
-    s.w = s.w if abs(s.w) > STILL else 0.0
-    s.yaw_rate = s.yaw_rate if abs(s.yaw_rate) > STILL else 0.0
-    s.left_speed = s.left_speed if abs(s.left_speed) > STILL else 0.0
-    s.right_speed = s.right_speed if abs(s.right_speed) > STILL else 0.0
 
 
 @kernel

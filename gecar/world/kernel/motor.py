@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from gecar.compiled import kernel
+from gecar.world.kernel.contacts import rub_shafts
 from gecar.world.kernel.series import decay, sine
 
 # rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
@@ -13,6 +14,7 @@ FULL_SPEED = math.radians(1000.0)
 
 
 FULL_DUTY = 0.999  # from here on a bridge no longer switches
+STILL = 1e-15  # m/s and rad/s
 
 
 @kernel
@@ -87,23 +89,105 @@ def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, ef
 
 
 @kernel
-def bare_shaft(
-    duty: float,
-    voltage: float,
-    angle: float,
-    speed: float,
+def run_motors(
+    s: Any,
+    left_duty: float,
+    right_duty: float,
+    left_torque: float,
+    right_torque: float,
     p: Any,
     c: Any,
-    torque: float = 0.0,
-    friction: float = 0.0,
-) -> float:
-    """Return the next speed [rad/s] of a shaft that carries nothing: a motor on a bench, a wheel in the air.
+    effects: bool,
+) -> None:
+    """Turn commands, and torques [N m] beside the motors', into the shafts' free speeds, at the step's voltage.
 
-    Beside the motor's own, a torque and a friction [N m] may act on it.
+    Then dry friction gives what it owes from the step before. A step knows one direction of a shaft and one torque:
+    where it turns round or sets off within the step, friction is off by up to twice what it can give, at random, as
+    that depends on where in the step it falls. What it then owes comes a step late, which is second order in the step.
     """
-    driven = conduct(duty, voltage, angle, speed, p, c) + torque * c.dt * c.inv_rotor
-    budget = max(friction_budget(driven, 0.0, 0.0, p, c) + friction * c.dt, 0.0) * c.inv_rotor
-    return driven - min(max(driven, -budget), budget)
+    left_stood, right_stood = s.left_before == 0.0, s.right_before == 0.0
+    s.left_before, s.right_before = s.left_speed, s.right_speed
+    left_sudden = right_sudden = 1.0
+    if effects:
+        if p.regulated != 0.0:
+            left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
+            right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
+        s.left_duty, left_duty, left_sudden = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
+        s.right_duty, right_duty, right_sudden = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
+    s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
+    s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
+    if effects:
+        s.left_drive = within_current(s.left_drive, s.voltage, s.left_speed, p)
+        s.right_drive = within_current(s.right_drive, s.voltage, s.right_speed, p)
+    left = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, effects)
+    right_angle = s.right_angle + p.ripple_lead
+    right = conduct(s.right_drive, s.voltage, right_angle, s.right_speed, p, c, effects)
+    left += left_torque * c.dt * c.inv_rotor
+    right += right_torque * c.dt * c.inv_rotor
+    s.left_speed, s.left_due = repaid(left, s.left_before, left_stood, s.left_due, left_sudden, s.left_dry, c)
+    s.right_speed, s.right_due = repaid(
+        right, s.right_before, right_stood, s.right_due, right_sudden, s.right_dry, c
+    )
+
+
+@kernel
+def repaid(
+    free: float, before: float, stood: bool, due: float, sudden: float, budget: float, c: Any
+) -> tuple[float, float]:
+    """Return a shaft's free speed with what friction owes, and the motor's impulse in this step if the shaft stands.
+
+    Such an impulse is also what is ``due`` of a shaft that ``stood`` before the last step, which had the ``budget``.
+    """
+    pull = (free - before) * c.rotor
+    owes = owed_at_start(due, pull, budget) if stood else due
+    stands = before == 0.0 and (stood or due == 0.0)
+    return free + owes * c.inv_rotor, pull * sudden if stands else 0.0
+
+
+@kernel
+def owed_at_start(pull: float, now: float, budget: float) -> float:
+    """Return the impulse [N m s] that dry friction owes a shaft which stood, and may have set off, in the last step.
+
+    The motor's impulse was ``pull`` then and is ``now`` in this one: a torque that came at once acted for pull / now of
+    the step. Friction held the shaft back for as long, and not before.
+    """
+    if pull * now <= 0.0 or abs(now) <= max(budget, abs(pull)):
+        return 0.0
+    due = abs(pull) * (1.0 - budget / abs(now)) - max(abs(pull) - budget, 0.0)
+    return math.copysign(due, pull)
+
+
+@kernel
+def owe(s: Any, left_load: float, right_load: float) -> None:
+    """Set what dry friction owes shafts that turned before the step, with the inertias that it turns [kg m²]."""
+    if s.left_before != 0.0:
+        s.left_due = owed(s.left_before, s.left_speed, s.left_friction, s.left_dry, left_load)
+    if s.right_before != 0.0:
+        s.right_due = owed(s.right_before, s.right_speed, s.right_friction, s.right_dry, right_load)
+
+
+@kernel
+def owed(before: float, after: float, friction: float, budget: float, load: float) -> float:
+    """Return the impulse [N m s] that dry friction owes a shaft that turned before the step.
+
+    At a constant torque it is slowed down until it stands, by friction and all else, for a share of the step. In the
+    rest it turns the other way, against friction, if all else is stronger.
+    """
+    way = math.copysign(1.0, before)
+    if after * way > 0.0 and friction == -way * budget:
+        return 0.0
+    had = abs(before) * load
+    slows = had + way * (friction - after * load)  # all else, in the whole step
+    if slows + budget <= had:  # it does not come to a stand
+        return -way * budget - friction
+    turned = way * min(budget - slows, 0.0) * (1.0 - had / (slows + budget))
+    return turned - after * load
+
+
+@kernel
+def unless_still(speed: float) -> float:
+    """End motion too slow to matter: sticking leaves ever smaller speeds, and denormal numbers cost 50 times more."""
+    return speed if abs(speed) > STILL else 0.0
 
 
 @kernel
@@ -132,16 +216,19 @@ def battery_current(s: Any, p: Any) -> float:
 
 
 @kernel
-def slewed(duty: float, last: float, c: Any) -> tuple[float, float]:
+def slewed(duty: float, last: float, c: Any) -> tuple[float, float, float]:
     """Return the duty that a ramp reaches in a step, ``slew`` from the last one at most, and the mean that acts in it.
+
+    The third number is the share of the step that is left when it is reached: 1 without a ramp.
 
     What acts is the mean over a step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on
     the way it is the last one. A ramp that acted with what it reaches would be a whole step early.
     """
     rise = duty - last
     if abs(rise) > c.slew:
-        return last + math.copysign(c.slew, rise), last
-    return duty, duty - rise * (abs(rise) / c.slew)
+        return last + math.copysign(c.slew, rise), last, 0.0
+    taken = abs(rise) / c.slew
+    return duty, duty - rise * taken, 1.0 - taken
 
 
 @kernel
@@ -189,23 +276,14 @@ def turn_bare_shafts(
     p: Any,
     c: Any,
 ) -> None:
-    """Advance both shafts by one step at the step's voltage; see `bare_shaft` for torques and frictions."""
-    if p.regulated != 0.0:
-        left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
-        right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-    s.left_duty, left_duty = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
-    s.right_duty, right_duty = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
-    left = effective_duty(left_duty, c.left_gain, c.left_dead, p)
-    right = effective_duty(right_duty, c.right_gain, c.right_dead, p)
-    s.left_drive = within_current(left, s.voltage, s.left_speed, p)
-    s.right_drive = within_current(right, s.voltage, s.right_speed, p)
-    right_angle = s.right_angle + p.ripple_lead
-    s.left_speed = bare_shaft(
-        s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, left_torque, left_friction
-    )
-    s.right_speed = bare_shaft(
-        s.right_drive, s.voltage, right_angle, s.right_speed, p, c, right_torque, right_friction
-    )
+    """Advance both shafts by one step at the step's voltage; torques and frictions [N m] may act beside the motor's."""
+    run_motors(s, left_duty, right_duty, left_torque, right_torque, p, c, True)
+    s.left_dry = max(friction_budget(s.left_speed, 0.0, 0.0, p, c) + left_friction * c.dt, 0.0)
+    s.right_dry = max(friction_budget(s.right_speed, 0.0, 0.0, p, c) + right_friction * c.dt, 0.0)
+    s.left_friction = s.right_friction = 0.0
+    rub_shafts(s, c)
+    s.left_speed, s.right_speed = unless_still(s.left_speed), unless_still(s.right_speed)
+    owe(s, c.rotor, c.rotor)
     s.left_angle += s.left_speed * c.dt
     s.right_angle += s.right_speed * c.dt
     s.battery_current = battery_current(s, p)

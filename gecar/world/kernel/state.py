@@ -18,6 +18,8 @@ _STATE_FIELDS = (
     "left_push right_push left_side right_side caster_push caster_side "
     "left_friction right_friction left_slides right_slides scrub "
     "left_duty right_duty left_integral right_integral battery_current "
+    # the shafts' speeds before the step, and what dry friction has yet to give them [N m s]
+    "left_before right_before left_due right_due "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
     "half_turn u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
 )
@@ -25,6 +27,7 @@ _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain left_dead right_dead slew torque lean "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
+    "left_load right_load "
     "weight caster_static caster_arm transfer_side left_gap right_gap apart tilt_x tilt_y sliding ripple "
     "regulator_p regulator_i"
 )
@@ -141,6 +144,9 @@ def _contact_masses(c: Any) -> None:
     c.m_ls = cross * (both + right) / determinant
     c.m_rs = -(cross * (both + left)) / determinant
     c.m_ss = (left * right - both * both) / determinant
+    # The inertia that dry friction turns, with tyres that hold.
+    c.left_load = c.rotor / (1.0 - c.m_ll * c.left_radius * c.left_radius * c.inv_rotor)
+    c.right_load = c.rotor / (1.0 - c.m_rr * c.right_radius * c.right_radius * c.inv_rotor)
     # The same with the other wheel sliding: its impulse is then what its circle gives, whatever this one's is.
     determinant = left * side - cross * cross
     c.n_ll, c.n_ls, c.n_lss = side / determinant, cross / determinant, left / determinant
@@ -162,6 +168,7 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.left_slides = s.right_slides = s.scrub = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
+    s.left_before = s.right_before = s.left_due = s.right_due = s.left_dry = s.right_dry = for_zero
     s.heading = heading
     s.cos = math.cos(heading)
     s.sin = math.sin(heading)
