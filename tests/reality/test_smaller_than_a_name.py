@@ -1,4 +1,4 @@
-"""What moves the robot by a material amount, though no effect of a size worth a name explains it, is not nothing."""
+"""What moves the robot by a material amount is named, though it is smaller than the catalogue's size."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from gecar.reality.materiality import DEFAULT
 from gecar.reality.recordings.recording import Case
 
 
-def test_it_stays_unexplained_and_the_effect_is_minor() -> None:
-    robot = EV3.with_effects({"dead_band_asymmetry": {"right_minus_left_pct": 1.2}})
+def test_a_dead_band_that_differs_by_less_than_the_catalogue_s_size_is_named_where_it_is_material() -> None:
+    robot = EV3.with_effects({"dead_band_asymmetry": {"right_minus_left_pct": 0.8}})
     verdict = discover(Case("made", tuple(recorded(robot, seed) for seed in range(5))))
-    assert (verdict.verdict, verdict.effects) == ("unexplained", ())
-    (minor,) = verdict.minor
-    assert minor.id == "dead_band_asymmetry"
-    assert minor.parameters["right_minus_left_pct"].value == pytest.approx(1.2, abs=0.1)
-    assert DEFAULT.times(minor.size) > 1.0
-    assert verdict.residual.material
+    (found,) = verdict.effects
+    assert (verdict.verdict, found.id, verdict.minor) == ("missing", "dead_band_asymmetry", ())
+    assert found.parameters["right_minus_left_pct"].value == pytest.approx(0.8, abs=0.1)
+    assert DEFAULT.times(found.size) > 1.0
+    assert not verdict.residual.material
 
 
 def test_a_slow_ripple_below_the_catalogue_s_size_is_named_where_it_is_material() -> None:

@@ -444,13 +444,13 @@ def small_sensitivities(
 
 
 def _small(effect: str) -> list[Parameter]:
-    """Return the parameters that may be off a little: derivatives at neutral say what that does."""
-    return [] if effect == RIPPLE else _sizes_of(effect)
+    """Return the parameters that may be off a little: residuals follow them smoothly from neutral on."""
+    return [] if effect == RIPPLE else [p for p in _sizes_of(effect) if p.smooth]
 
 
 def _sizes_of(effect: str) -> list[Parameter]:
-    """Return an effect's sizes: the parameters that residuals follow smoothly from neutral on."""
-    return [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0 and p.smooth]
+    """Return an effect's sizes."""
+    return [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0]
 
 
 def scattered(offsets_s: Array) -> bool:
