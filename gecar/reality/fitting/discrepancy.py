@@ -57,8 +57,8 @@ class Discrepancy:
     uncertain
         Which of the parameters' small changes residuals show, shape (parameters,); the changes after those are of
         instruments and ripples.
-    unnamed
-        Singular vectors and values, as ``basis`` and ``spread``, of the changes of instruments and ripples alone.
+    parameters
+        How many of the changes, the first, are of parameters.
     """
 
     scale: Array
@@ -69,7 +69,7 @@ class Discrepancy:
     ratios: Array
     small: Array
     uncertain: npt.NDArray[np.bool_]
-    unnamed: tuple[Array, Array]
+    parameters: int
 
     def whitened(self, errors: Array) -> Array:
         """Return residuals of unit variance, shape (n,) or (m, n), from those in units of the sensors' noise."""
@@ -91,7 +91,9 @@ class Discrepancy:
 
     @cached_property
     def _shrinking_unnamed(self) -> tuple[Single, Single]:
-        return self._factors(*self.unnamed)
+        columns = self.spread[:, None] * self.back[:, self.parameters :]
+        spread, back = _decomposed(columns.T @ columns)
+        return self._factors(self.basis @ (columns @ (back / spread)), spread)
 
     def _factors(self, basis: Array, spread: Array) -> tuple[Single, Single]:
         """Return two matrices: from scaled residuals to coordinates in a basis, and from these to what is subtracted.
@@ -143,22 +145,22 @@ def discrepancy(
     ratios, weight = np.ones(len(CHANNELS)), np.ones(len(errors))
     for _ in range(ROUNDS):
         scale = 1.0 / np.sqrt(ratios[channel])
-        basis, spread, _ = _decomposed(slopes, scale, weight, large)
-        inside = (errors * scale * weight) @ basis
-        left = errors * scale - (basis @ (inside * spread**2 / (1.0 + spread**2))) / weight
+        columns = slopes * large * (scale * weight)[:, None]
+        gram = columns.T @ columns + np.eye(len(large))
+        explained = columns @ np.linalg.solve(gram, (errors * scale * weight) @ columns)
+        left = errors * scale - explained / weight
         weight = np.sqrt(weights(left))
         ratios = np.maximum(blocks.variances(np.clip(left, -CLIP, CLIP)) * ratios, 1.0)
     scale = 1.0 / np.sqrt(ratios[channel])
-    whole = _decomposed(slopes, scale, weight, small)
-    unnamed = _decomposed(slopes[:, parameters:], scale, weight, small[parameters:])[:2]
+    columns = slopes * small * (scale * weight)[:, None]
+    spread, back = _decomposed(columns.T @ columns)
     uncertain = np.any(slopes[:, :parameters], axis=0)
-    return Discrepancy(scale, weight, *whole, ratios, small, uncertain, unnamed)
+    basis = columns @ (back / spread)
+    return Discrepancy(scale, weight, basis, spread, back.T, ratios, small, uncertain, parameters)
 
 
-def _decomposed(slopes: Array, scale: Array, weight: Array, size: Array) -> tuple[Array, Array, Array]:
-    """Return singular vectors and values of sensitivities to changes of some sizes, by their small Gram matrix."""
-    columns = slopes * size * (scale * weight)[:, None]
-    squares, back = np.linalg.eigh(columns.T @ columns)
+def _decomposed(gram: Array) -> tuple[Array, Array]:
+    """Return singular values, shape (k,), and right singular vectors, shape (columns, k), of what has a Gram matrix."""
+    squares, back = np.linalg.eigh(gram)
     felt = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1.0)
-    spread, back = np.sqrt(squares[felt]), back[:, felt]
-    return columns @ (back / spread), spread, back.T
+    return np.sqrt(squares[felt]), back[:, felt]

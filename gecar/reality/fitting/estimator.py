@@ -140,7 +140,11 @@ class Estimator:
 
     def sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
         """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k)."""
-        return [self.whitened(slopes.T).T for slopes in self.plain_sensitivities(model, effects)]
+        plain = self.plain_sensitivities(model, effects)
+        if not plain:
+            return []
+        whitened = self.whitened(np.concatenate([slopes.T for slopes in plain]))
+        return [rows.T for rows in np.split(whitened, np.cumsum([slopes.shape[1] for slopes in plain[:-1]]))]
 
     def plain_sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
         """Return the same of residuals in units of the sensors' noise; those of the last few fits are kept."""

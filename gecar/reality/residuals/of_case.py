@@ -65,8 +65,9 @@ class Residuals:
         parts = self.threads.map(
             lambda r: r.sensor_errors(physics) if self.sensor else r.motion_errors(physics), self.recordings
         )
-        everything = np.concatenate(parts, axis=1)[:, self._located[1]]
-        return np.clip(np.nan_to_num(everything, nan=LARGEST), -LARGEST, LARGEST)
+        found = np.concatenate(parts, axis=1)[:, self._located[1]]
+        found[np.isnan(found)] = LARGEST
+        return np.clip(found, -LARGEST, LARGEST, out=found)
 
     @cached_property
     def _located(self) -> tuple[ResidualIndex, Mask]:
