@@ -482,6 +482,19 @@ def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
     assert told.size == written.explained.problem.sizes.apart(whole.physics, rest.physics)
 
 
+def test_a_law_beside_others_goes_as_a_whole_and_a_sum_part_by_part():
+    scrub, drag = (
+        Term(**dict(SCRUB)),
+        Term(port="motor_torque", law="c1 * speed + c2 * sign(speed)", c1=-1.0, c2=-2.0),
+    )
+    shorter = list(beside._shorter(Written(None, (scrub, drag), ("scrubs", "drags"))))
+    assert [told for _, told in shorter] == [("drags",), ("scrubs", "drags"), ("scrubs", "drags")]
+    assert [[term.law for term in terms] for terms, _ in shorter] == [
+        [drag.law], [scrub.law, "c1 * sign(speed)"], [scrub.law, "c1 * speed"]
+    ]  # fmt: skip
+    assert not list(beside._shorter(Written(None, (scrub,), ("scrubs",))))
+
+
 def with_rough_bearings(coefficient_nms):
     """Return what is discovered where the only effect in the catalogue is beside a moment that scrubs."""
     rough = robot_with(dict(SCRUB)).with_effects({"viscous_friction": {"coefficient_nms": coefficient_nms}})

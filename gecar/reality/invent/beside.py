@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from gecar.reality.fitting.estimator import directions
 from gecar.reality.fitting.model import Step
 from gecar.reality.fitting.parameters import free
-from gecar.reality.invent.sentences import shortened
+from gecar.reality.invent.sentences import Laws, pieces, shortened
 from gecar.reality.invent.written import (
     Together,
     Written,
@@ -28,6 +28,7 @@ from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
 from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
 from gecar.reality.uncertainty.intervals import contains_neutral, intervals
+from gecar.reality.verdict import Invented
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -61,25 +62,37 @@ def _refitted(written: Written, first: Explanation, fitted: Together) -> Written
 
 
 def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) -> Written:
-    """Exchange a part of a law's sum for an effect that explains about as much, as long as there is one.
+    """Exchange a law beside others, or a part of its sum, for an effect that explains about as much, until none does.
 
     A cause of the catalogue goes before a part of a law, unless it explains less by what a name costs.
     """
     here = written.explained
     if len(here.taken.effects) >= MOST_EFFECTS:
         return written
-    for fewer in shortened(written.terms):
-        if len(fewer) < len(written.terms):  # that is no part, but a law as a whole
-            continue
+    catalogue = frozenset(here.problem.catalogue)
+    for fewer, told in _shorter(written):
         fitted = fitted_with(written, first, fewer)
-        alike = _doing_as_much(here, fitted.errors - here.taken.errors)
+        # A whole law may do far more than derivatives tell: any effect is then tried.
+        is_part = len(fewer) == len(written.terms)
+        alike = _doing_as_much(here, fitted.errors - here.taken.errors) if is_part else catalogue
         if not alike:
             continue
-        others = frozenset(here.problem.catalogue) - alike
-        swapped = _with_one_more(_refitted(written, first, fitted), first, held, others)
+        others = catalogue - alike
+        without = replace(_refitted(written, first, fitted), invented=told)
+        swapped = _with_one_more(without, first, held, others)
         if swapped and here.problem.cost_of(swapped.explained.taken.physics) <= here.taken.cost + PRICE:
             return _in_place_of_parts(swapped, first, held)
     return written
+
+
+def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
+    """Yield laws without one of their parts, and what the verdict says of those left; at least one law is."""
+    for k, law in enumerate(written.terms):
+        before, after = written.terms[:k], written.terms[k + 1 :]
+        for fewer in shortened((law,)):
+            yield (*before, *fewer, *after), written.invented
+        if len(pieces(law)) == 1 and (before or after):
+            yield (*before, *after), (*written.invented[:k], *written.invented[k + 1 :])
 
 
 def _doing_as_much(here: Explanation, change: Array) -> set[str]:
