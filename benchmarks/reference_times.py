@@ -240,18 +240,14 @@ def search(course: str, starts: range, generations: int) -> None:
 
 def renew(course: str, generations: int) -> None:
     """Search about the drive that is stored, and store what is best now."""
-    hunt, stored = (
-        Search(load_robot(ROBOT), load_course(course)),
-        np.array(reference_table()[course]["points"]),
-    )
-    time_s, points = min(
-        (hunt.best_about(stored, seed, generations, near=near) for seed, near in enumerate((NEAR, 1.0))),
-        key=lambda found: found[0],
-    )
+    hunt = Search(load_robot(ROBOT), load_course(course))
+    stored = np.array(reference_table()[course]["points"])
     now = hunt.drive(stored)[0]
+    found = [hunt.best_about(stored, seed, generations, near=near) for seed, near in enumerate((NEAR, 1.0))]
+    time_s, points = min([(now, stored), *found], key=lambda drive: drive[0])
     print(f"{course}: {now:.3f} s, {time_s:.3f} s after the search", file=sys.stderr, flush=True)
-    if min(now, time_s) < UNREACHED:
-        _keep(course, *((time_s, points) if time_s < now else (now, stored)))
+    if time_s < UNREACHED:
+        _keep(course, time_s, points)
 
 
 def _keep(course: str, time_s: float, points: Array) -> None:

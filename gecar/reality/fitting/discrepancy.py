@@ -160,7 +160,7 @@ def discrepancy(
 
 
 def _decomposed(gram: Array) -> tuple[Array, Array]:
-    """Return singular values, shape (k,), and right singular vectors, shape (columns, k), of what has a Gram matrix."""
+    """Return a matrix's singular values, shape (k,), and right singular vectors, (columns, k), from its Gram matrix."""
     squares, back = np.linalg.eigh(gram)
     felt = squares > 1e-6 * max(float(squares.max(initial=0.0)), 1.0)
     return np.sqrt(squares[felt]), back[:, felt]

@@ -86,7 +86,7 @@ def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) ->
 
 
 def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
-    """Yield laws without one of their parts, and what the verdict says of those left; at least one law is."""
+    """Yield the laws that remain without one part, or without a whole law, and what the verdict says of each."""
     for k, law in enumerate(written.terms):
         before, after = written.terms[:k], written.terms[k + 1 :]
         for fewer in shortened((law,)):

@@ -154,7 +154,7 @@ def of_both_motors(explained: Explanation, grammar: Grammar) -> tuple[Grammar, l
 
 
 def _as_whitened(explained: Explanation) -> Explanation:
-    """Return an explanation whose model has its residuals whitened as its problem has them."""
+    """Return an explanation with its model's residuals whitened under its own problem."""
     return replace(explained, taken=explained.problem.estimator.at(explained.taken, explained.taken.z))
 
 

@@ -168,7 +168,7 @@ def _key(part: Term) -> str:
 
 
 def variables_of(laws: Laws) -> set[str]:
-    """Return what laws look at; one of a single wheel looks at the side."""
+    """Return the variables that laws use; a law of a single wheel uses the side."""
     sides = {"side" for term in laws if term.side != "both"}
     return sides.union(*(term.parsed.variables for term in laws))
 

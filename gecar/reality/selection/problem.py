@@ -449,7 +449,7 @@ def _small(effect: str) -> list[Parameter]:
 
 
 def _sizes_of(effect: str) -> list[Parameter]:
-    """Return an effect's sizes."""
+    """Return the parameters of an effect that have a size worth a name."""
     return [p for p in BY_ID[effect].parameters if p.worthwhile > 0.0]
 
 

@@ -238,7 +238,6 @@ def enter_step(s: Any, c: Any, effects: bool) -> None:
 def end_step(s: Any, p: Any, c: Any, effects: bool) -> None:
     """End a step: what the contacts left of the velocities moves the shafts; `drift` then moves the body."""
     s.u, s.w, s.yaw_rate = unless_still(s.u), unless_still(s.w), unless_still(s.yaw_rate)
-    s.left_speed, s.right_speed = unless_still(s.left_speed), unless_still(s.right_speed)
     # A wheel that slides, or is within its play, leaves friction the rotor alone.
     owe(
         s,

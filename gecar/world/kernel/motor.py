@@ -159,7 +159,11 @@ def owed_at_start(pull: float, now: float, budget: float) -> float:
 
 @kernel
 def owe(s: Any, left_load: float, right_load: float) -> None:
-    """Set what dry friction owes shafts that turned before the step, with the inertias that it turns [kg m²]."""
+    """Let shafts that hardly turn stand, and set what dry friction owes those that turned before the step.
+
+    ``load`` is the inertia that it turns [kg m²].
+    """
+    s.left_speed, s.right_speed = unless_still(s.left_speed), unless_still(s.right_speed)
     if s.left_before != 0.0:
         s.left_due = owed(s.left_before, s.left_speed, s.left_friction, s.left_dry, left_load)
     if s.right_before != 0.0:
@@ -217,12 +221,11 @@ def battery_current(s: Any, p: Any) -> float:
 
 @kernel
 def slewed(duty: float, last: float, c: Any) -> tuple[float, float, float]:
-    """Return the duty that a ramp reaches in a step, ``slew`` from the last one at most, and the mean that acts in it.
+    """Return the duty that a ramp reaches in a step, the mean that acts in it, and the share of the step left then.
 
-    The third number is the share of the step that is left when it is reached: 1 without a ramp.
-
-    What acts is the mean over a step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on
-    the way it is the last one. A ramp that acted with what it reaches would be a whole step early.
+    It goes ``slew`` from the last duty at most; without a ramp all of the step is left. What acts is the mean over a
+    step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on the way it is the last duty. A
+    ramp that acted with what it reaches would be a whole step early.
     """
     rise = duty - last
     if abs(rise) > c.slew:
@@ -282,7 +285,6 @@ def turn_bare_shafts(
     s.right_dry = max(friction_budget(s.right_speed, 0.0, 0.0, p, c) + right_friction * c.dt, 0.0)
     s.left_friction = s.right_friction = 0.0
     rub_shafts(s, c)
-    s.left_speed, s.right_speed = unless_still(s.left_speed), unless_still(s.right_speed)
     owe(s, c.rotor, c.rotor)
     s.left_angle += s.left_speed * c.dt
     s.right_angle += s.right_speed * c.dt
