@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import importlib
+import inspect
 import json
 import math
+import pkgutil
 import sys
 from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
@@ -17,6 +20,7 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the concealed cases are not tested (pip install gecar[test])"
 )
 
+import benchmarks
 from benchmarks import invention
 from benchmarks.concealed import cases, commands, practice, program
 from benchmarks.concealed.colour_sensor import line_share
@@ -276,6 +280,23 @@ def test_comparators_replace_parts_that_are_there(name):
     with changed(name):
         assert all(vars(owner)[part] is other for owner, part, other in METHODS[name])
     assert confirmation.explain is explain
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_comparators_can_be_called_as_the_parts_that_they_replace(name):
+    for owner, part, other in METHODS[name]:
+        asked = inspect.signature(vars(owner)[part]).parameters.values()
+        by_place = [each.name for each in asked if each.default is each.empty]
+        by_name = {each.name: each.default for each in asked if each.default is not each.empty}
+        inspect.signature(other).bind(*by_place, **by_name)
+
+
+def test_every_benchmark_can_be_imported():
+    for module in pkgutil.walk_packages(benchmarks.__path__, "benchmarks."):
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError as error:  # a peer or a world that is not installed, never a part of gecar
+            assert error.name and error.name.split(".")[0] not in {"gecar", "benchmarks"}
 
 
 def test_program_follows_the_line_to_the_goal(tmp_path):

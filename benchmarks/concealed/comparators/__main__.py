@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from benchmarks.concealed.comparators.methods import METHODS, changed
 from benchmarks.concealed.comparators.sparse import sparse_regression
-from gecar.cli.output import plain
-from gecar.files import write_whole
+from gecar.files import json_text, write_whole
 from gecar.reality import discovery
 from gecar.reality.recordings.recording import Case, read_case
 
@@ -22,12 +22,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--holdout", default="", help="recordings set aside, with commas between")
     chosen = parser.parse_args()
-    verdict = plain(_verdict(chosen.name, read_case(chosen.case), chosen.holdout.split(",")))
+    verdict = _verdict(chosen.name, read_case(chosen.case), chosen.holdout.split(","))
     chosen.out.mkdir(parents=True, exist_ok=True)
-    write_whole(chosen.out / "verdict.json", json.dumps(verdict, indent=1, allow_nan=False) + "\n")
+    write_whole(chosen.out / "verdict.json", json_text(verdict))
 
 
-def _verdict(name: str, case: Case, holdout: list[str]) -> object:
+def _verdict(name: str, case: Case, holdout: list[str]) -> Mapping[str, Any]:
     if name == "sparse":
         return sparse_regression(case, holdout)
     with changed(name):

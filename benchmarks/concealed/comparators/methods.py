@@ -40,7 +40,7 @@ REFITTED = 5  # effects a stage, as `gecar`
 START_S = 1.0  # over which an open-loop replay's start pose is fitted
 
 
-def by_bic(problem: Problem) -> Explanation:
+def by_bic(problem: Problem, once_more: bool = False) -> Explanation:  # noqa: ARG001
     """Take the effect that lowers BIC most, as long as one does (Schwarz 1978).
 
     Effects are screened as `gecar` screens them: only the criterion differs.
@@ -64,7 +64,7 @@ def _bic(model: Model) -> float:
 
 def _stage(problem: Problem, model: Model) -> list[Step]:
     """Fit the effects that promise most, by their sensitivities or from the best of their starts."""
-    others = [e for e in problem.catalogue if e not in model.effects]
+    others = [e for e in problem.tried if e not in model.effects]
     begun = {e: _begun(problem, model, e) for e in others}
     best = sorted(others, key=lambda e: -begun[e][0])[:REFITTED]
     fitted = [problem.estimator.fit((*model.effects, e), begun[e][1], ROUNDS) for e in best]
@@ -90,12 +90,12 @@ def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]
     )
 
 
-def everything(problem: Problem) -> Explanation:
+def everything(problem: Problem, once_more: bool = False) -> Explanation:  # noqa: ARG001
     """Fit all effects at once; name those of a size worth it whose 95 % interval leaves out neutral."""
-    model = problem.estimator.fit(problem.catalogue, {}, ROUNDS)
+    model = problem.estimator.fit(problem.tried, {}, ROUNDS)
     sure = np.abs(model.z) > half_widths(problem.estimator, model)
     seen = {c.effect.id for c, told in zip(model.parameters.coordinates, sure, strict=True) if told}
-    named = [e for e in problem.catalogue if e in seen and is_worthwhile(model, e)]
+    named = [e for e in problem.tried if e in seen and is_worthwhile(model, e)]
     steps = [Step(e, problem.known, model, problem.known.cost - model.cost) for e in named]
     return concluded(problem, model, steps, ((),) * len(steps))
 
@@ -107,7 +107,7 @@ def without_null(problem: Problem, step: Step) -> Step:
 
 def by_sensitivities(problem: Problem, model: Model) -> list[Step]:
     """Rank every other effect by its sensitivities, and take one step along them: screening, never a fit."""
-    others = (e for e in problem.catalogue if e not in model.effects)
+    others = (e for e in problem.tried if e not in model.effects)
     promises = {e: problem.estimator.linear_gain(model, e) for e in others}
     best = sorted(promises, key=lambda e: -promises[e])[:REFITTED]
     return [_linear_step(problem.estimator, model, effect, promises[effect]) for effect in best]
@@ -168,7 +168,7 @@ def _white(blocks: Blocks, errors: Array) -> Array:  # noqa: ARG001
     return np.ones(len(CHANNELS))
 
 
-def without_discrepancy(problem: Problem, *_: object) -> Problem:
+def without_discrepancy(problem: Problem, *_: object, **__: object) -> Problem:
     """Take the simulation for exact: only the sensors' noise counts."""
     return problem
 
