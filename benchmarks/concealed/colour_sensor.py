@@ -121,6 +121,9 @@ class ColourSensor:
             light *= (
                 1.0 + share * (math.sin(2.0 * math.pi * hertz * self._ticks * TICK_S + phase) - 1.0) / 2.0
             )
+        if self._hidden.warming is not None:
+            lost, time = self._hidden.warming
+            light *= 1.0 - lost * (1.0 - math.exp(-self._ticks * TICK_S / time))
         if self._hidden.auto_gain is not None:
             light *= self._gain(light)
         self._ticks += 1
@@ -148,6 +151,8 @@ class ColourSensor:
             other = self._printed(spot_x + cos * on - sin * aside, spot_y + sin * on + cos * aside)
         spot_x, spot_y = self._printed(spot_x, spot_y)
         dark = line_share(spot_x, spot_y, hidden.spot_diameter)
+        if hidden.faded is not None:
+            dark *= self._ink(spot_x, spot_y)
         if hidden.second_spot is not None and other is not None:
             dark += hidden.second_spot[0] * (line_share(*other, hidden.spot_diameter) - dark)
         light = 100.0 * (1.0 - dark)
@@ -172,6 +177,12 @@ class ColourSensor:
         cos, sin = math.cos(angle), math.sin(angle)
         x, y = x - dx, y - dy
         return cos * x + sin * y, cos * y - sin * x
+
+    def _ink(self, x: float, y: float) -> float:
+        """Give the share of the line's ink that is left at a place where the print is worn."""
+        lost, worn_x, worn_y, radius = self._hidden.faded or (0.0, 0.0, 0.0, 1.0)
+        away = math.hypot(x - worn_x, y - worn_y) / radius
+        return 1.0 - lost * math.exp(-(away**4))  # worn alike within, and hardly beyond
 
     def _shade(self, x: float, y: float) -> float:
         """Give the share of light that a shadow takes, whose edge is straight and blurred."""

@@ -14,6 +14,7 @@ _TOOTH_BLEND = 0.2  # rad/s: below this a damaged tooth lets go, so that it cann
 _RUB_BLEND = 0.5  # rad/s: below this difference of speeds the axles' rubbing fades out
 _LOSS_BLEND = 0.2  # rad/s: below this what gears lose fades out, so that it cannot drive the robot
 _GREASE_BLEND = 0.3  # rad/s: below this grease, being a liquid, gives way
+_HUM_BLEND = 0.2  # rad/s: below this what a resonance takes fades out
 _BAND_SLIPS = 10.0  # rad: a rubber band round the axle slips rather than winding up for ever
 
 
@@ -53,6 +54,10 @@ class DriveTrain:
         self._held: list[float | None] = [None, None]  # angles at which the motors were stopped [rad]
         self._softened = 0.0  # share of a grease's stiffness that is worked away
         self._sagged = 0.0  # V, of the battery's slow part
+        self._given: list[tuple[float, float]] = [
+            (0.0, 0.0)
+        ] * 2  # duty [%] of each motor, and since when [s]
+        self._warm = [0.0, 0.0]  # of each motor's fuse, 1 where its rated current brings it
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
         """Pass one tick's command through delay, ramp, cap and dead band.
@@ -78,6 +83,9 @@ class DriveTrain:
             if ticking > self._polled[0]:
                 self._polled = ticking, command_pct
             command_pct = self._polled[1]
+        if self._hidden.throttle is not None:
+            left, right = command_pct
+            command_pct = self._throttled(0, left, time_s), self._throttled(1, right, time_s)
         self._queue.append(command_pct)
         late = self._queue.popleft()
         most = self._hidden.command_slew * TICK_S
@@ -113,6 +121,13 @@ class DriveTrain:
             return 0.0
         driven_at[way] = time_s
         return duty_pct
+
+    def _throttled(self, side: int, duty_pct: float, time_s: float) -> float:
+        """Take a share off a duty that has been the same for a while."""
+        share, after = self._hidden.throttle or (0.0, math.inf)
+        if duty_pct != self._given[side][0]:
+            self._given[side] = duty_pct, time_s
+        return duty_pct if time_s - self._given[side][1] < after else duty_pct * (1.0 - share)
 
     def drive(
         self,
@@ -185,6 +200,8 @@ class DriveTrain:
         source = self._base.supply * self._hidden.supply_scale - self._hidden.battery_drain * time_s
         if self._hidden.slow_sag is not None:
             source = self._sag(source, duties, speeds)
+        if self._hidden.loose_cell is not None:
+            source *= self._touching(speeds)
         inner = self._hidden.battery_resistance
         if inner == 0.0:
             return source
@@ -195,6 +212,14 @@ class DriveTrain:
             / self._base.resistance
         )
         return (source + inner * back) / (1.0 + inner * load)
+
+    def _touching(self, speeds: tuple[float, float]) -> float:
+        """Give the share of the voltage that is left while a curve pulls a cell off its spring."""
+        share, half, way = self._hidden.loose_cell or (0.0, 1.0, 1.0)
+        radius, track = self._base.wheel_radius, self._base.track_width
+        sideways = way * radius**2 * (speeds[1] ** 2 - speeds[0] ** 2) / (2.0 * track)
+        pulled = max(sideways / half, 0.0) ** 2
+        return 1.0 - share * pulled / (1.0 + pulled)
 
     def _sag(self, source: float, duties: tuple[float, float], speeds: tuple[float, float]) -> float:
         """Let the battery's slow part follow the current drawn; give what is left of the source's voltage [V]."""
@@ -246,7 +271,25 @@ class DriveTrain:
             torque -= hidden.gear_loss[0] * abs(usual) * math.tanh(speed / _LOSS_BLEND)
         if hidden.grease is not None and hidden.grease[3] == side:
             torque -= self._stiffness(speed) * math.tanh(speed / _GREASE_BLEND)
-        return torque
+        return torque - self._taken(side, usual, speed)
+
+    def _taken(self, side: int, usual: float, speed: float) -> float:
+        """Torque that a resonance and a fuse take [N m]."""
+        taken = 0.0
+        if self._hidden.hum is not None and self._hidden.hum[3] == side:
+            most, at, width, _ = self._hidden.hum
+            taken += most * math.tanh(speed / _HUM_BLEND) / (1.0 + ((abs(speed) - at) / width) ** 2)
+        if self._hidden.fuse is not None:
+            taken += self._fused(side, usual)
+        return taken
+
+    def _fused(self, side: int, usual: float) -> float:
+        """Warm a motor's fuse by the current through it; give the torque that its resistance costs [N m]."""
+        share, rated, time = self._hidden.fuse or (0.0, 1.0, 1.0)
+        grown = share * self._warm[side]
+        current = usual / self._base.torque_constant / (1.0 + grown)
+        self._warm[side] += TICK_S / time * ((current / rated) ** 2 - self._warm[side])
+        return usual * grown / (1.0 + grown)
 
     def _stiffness(self, speed: float) -> float:
         """Work grease soft by turning, while it stiffens with time; give its torque [N m]."""

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from benchmarks.concealed.colour_sensor import FIELD
 from benchmarks.concealed.history import ROW_TICKS, TICK_S, Array, History
-from benchmarks.concealed.robot import EV3, NEUTRAL, Base, Concealed
+from benchmarks.concealed.robot import EV3, KNOT_S, NEUTRAL, Base, Concealed
 
 Ticks = npt.NDArray[np.intp]
 
@@ -282,6 +282,9 @@ def seen_pose(
     """Pose as the camera has it: of its marker, late, from aslant, through its lens, from its slowly turning mount."""
     times = history.time_s[ticks]
     shown = times - late_s if concealed.frame_rate == 0.0 else times / (1.0 + concealed.frame_rate) - late_s
+    if concealed.backlog is not None:
+        most, period, gone = concealed.backlog
+        shown = shown - most * ((times / period + gone) % 1.0)
     pose = np.stack([np.interp(shown, history.time_s, column) for column in history.pose.T])
     ahead, left = concealed.marker
     if (ahead, left) != (0.0, 0.0):
@@ -297,6 +300,12 @@ def seen_pose(
         after = times >= since
         away = away + np.outer([shift_x, shift_y], after)
         turn = turn + bumped * after
+    if concealed.shake:
+        knots = KNOT_S * np.arange(len(concealed.shake))
+        shift_x, shift_y, shaken = (
+            np.interp(times, knots, column) for column in np.transpose(concealed.shake)
+        )
+        away, turn = away + np.stack([shift_x, shift_y]), turn + shaken
     x = FIELD[0] / 2.0 + np.cos(turn) * away[0] - np.sin(turn) * away[1]
     y = FIELD[1] / 2.0 + np.sin(turn) * away[0] + np.cos(turn) * away[1]
     return x, y, pose[2] + turn

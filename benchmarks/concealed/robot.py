@@ -17,7 +17,7 @@ RESISTANCE = 5.50  # ohm
 SHAFT_INERTIA = 0.00248  # kg m^2
 SUPPLY = 8.67  # V
 DUTY_CAP = 0.80
-KNOT_S = 0.5  # s between two knots of a drive that wanders
+KNOT_S = 0.5  # s between two knots of a drive, or of a camera, that wanders
 GRAVITY = 9.81  # m / s^2
 
 # Not in the nominal robot's file, and hardly felt: a 3D robot needs them, a planar one does not.
@@ -178,6 +178,30 @@ class Concealed:
     keystone: tuple[float, float] = (0.0, 0.0)  # how the camera's scale falls along x and y [1/m]
     frame_rate: float = 0.0  # frames come faster than they are counted for by this share
     grooves: tuple[float, float] | None = None  # drag on the caster across them [N], their heading [rad]
+
+    # Outside the catalogue, from the fifth set of kinds.
+    hum: tuple[float, float, float, int] | None = (
+        None  # torque [N m] at a speed, half width [rad/s] of it, side
+    )
+    scrub: float = 0.0  # dry friction of the tyres' width against turning [N m]
+    # Share of a motor's resistance that a fuse adds at its rated current, this current [A], time of warming [s].
+    fuse: tuple[float, float, float] | None = None
+    throttle: tuple[float, float] | None = None  # share taken off a duty that is held, from when on [s]
+    # Share of the battery's voltage lost, acceleration sideways that takes half of it [m/s^2], to which way (1: left).
+    loose_cell: tuple[float, float, float] | None = None
+    # Place of a fan [m], its push 1 m away [N], period in which it swings [s], phase [rad].
+    fan: tuple[float, float, float, float, float] | None = None
+    # Slope [rad], place on the hinge, x [m], way of tipping [rad], from how far beyond the hinge on it tips [m].
+    rocking: tuple[float, float, float, float] | None = None
+    patches: tuple[float, float, float] | None = None  # greatest brake [N m], size of each [m], which pattern
+    warming: tuple[float, float] | None = None  # share of light a warm lamp lacks, time of warming [s]
+    faded: tuple[float, float, float, float] | None = None  # share of ink lost, x, y, radius [m]
+    shake: tuple[
+        tuple[float, float, float], ...
+    ] = ()  # camera's shift [m] and turn [rad] at every half second
+    backlog: tuple[float, float, float] | None = (
+        None  # most that poses lag [s], period [s], share of one gone
+    )
 
     # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
     inductance_scale: float = 1.0

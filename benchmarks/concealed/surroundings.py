@@ -16,6 +16,10 @@ from benchmarks.concealed.robot import GRAVITY, Concealed
 _DRAG_BLEND = 0.02  # m/s: below this drags fade out, so that they cannot drive the robot
 _TWIST_SLIPS = 6.0  # rad: a cable from above slips in its clamp rather than winding up for ever
 _ROLLING_BLEND = 0.2  # rad/s: below this rolling resistance fades out, so that it cannot drive the robot
+_SCRUB_BLEND = 0.2  # rad/s: below this rate of turning tyres flex instead of scrubbing
+_FAN_SWINGS = 0.7  # rad, to either side of the field's middle
+_FAN_BEAM = 0.25  # rad off the beam's middle its push is down to a third
+_TIPPING = 0.1  # s, time constant of a table that tips
 
 
 class Surroundings:
@@ -40,16 +44,21 @@ class Surroundings:
         self._scratch = np.zeros(6)
         drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
         hauled = concealed.trailer or concealed.twist
-        dragged = concealed.hair or concealed.grooves
+        dragged = concealed.hair or concealed.grooves or concealed.fan or concealed.scrub
         self._pushed = bool(
             concealed.tether or concealed.magnet or concealed.gusts or drags or hauled or dragged
         )
-        self._braked = bool(concealed.rolling_resistance or concealed.strip or concealed.frame_rub)
+        self._braked = bool(
+            concealed.rolling_resistance or concealed.strip or concealed.frame_rub or concealed.patches
+        )
         self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
-        self.idle = not (self._pushed or self._gripped or concealed.waves or self._braked)
+        self.idle = not (
+            self._pushed or self._gripped or concealed.waves or concealed.rocking or self._braked
+        )
         self._rolled, self._castor = 0.0, math.nan  # way of the wheels [m], heading of a castor wheel [rad]
         self._turned = 0.0  # since the recording began [rad]
         self._wound = 0.0  # way of hair round the caster [m]
+        self._tipped = (math.nan, 1.0)  # how far a table is tipped now, and to which side
         self._weight: tuple[float, float] | None = None  # place of a weight on a string [m]
         shafts = [model.joint(side) for side in ("left", "right")]
         self._angle_at = [int(shaft.qposadr[0]) for shaft in shafts]
@@ -79,6 +88,10 @@ class Surroundings:
             self._lean(
                 tilt_x + slope * math.sin(turn * x + phase_x), tilt_y + slope * math.sin(turn * y + phase_y)
             )
+        if self._hidden.rocking is not None:
+            slope, _, way, _ = self._hidden.rocking
+            (tilt_x, tilt_y), leaning = self._hidden.tilt, slope * self._tip(x, y)
+            self._lean(tilt_x + leaning * math.cos(way), tilt_y + leaning * math.sin(way))
         if self._pushed:
             heading = _heading(state)
             force_x, force_y = self._push(x, y, state.qvel, time_s)
@@ -101,6 +114,18 @@ class Surroundings:
             GRAVITY * math.sin(along_y),
             GRAVITY * down,
         ]
+
+    def _tip(self, x: float, y: float) -> float:
+        """Let a table on uneven legs tip to the side where the robot is; give how far it has, from -1 to 1."""
+        _, hinge_x, way, play = self._hidden.rocking or (0.0, 0.0, 0.0, 0.0)
+        beyond = math.cos(way) * (x - hinge_x) + math.sin(way) * (y - FIELD[1] / 2.0)
+        tipped, side = self._tipped
+        if math.isnan(tipped):  # it has borne the robot since before the recording
+            tipped = side = math.copysign(1.0, beyond)
+        if abs(beyond) > play:
+            side = math.copysign(1.0, beyond)
+        self._tipped = tipped + TICK_S / _TIPPING * (side - tipped), side
+        return tipped
 
     def _grip(self, x: float, y: float, state: mujoco.MjData) -> None:
         """Set each tyre's friction: a disc on the floor, dust on the tread, a wheel that hops."""
@@ -128,6 +153,8 @@ class Surroundings:
         if hidden.twist > 0.0:
             turning -= hidden.twist * self._turned / (1.0 + abs(self._turned) / _TWIST_SLIPS)
             self._turned += TICK_S * rate
+        if hidden.scrub > 0.0:
+            turning -= hidden.scrub * math.tanh(rate / _SCRUB_BLEND)
         if hidden.pile is not None:
             most, way = hidden.pile
             ahead = math.cos(heading) * velocity[0] + math.sin(heading) * velocity[1]
@@ -206,17 +233,32 @@ class Surroundings:
         if hidden.air_drag > 0.0:
             drag = hidden.air_drag * math.hypot(velocity[0], velocity[1])
             force_x, force_y = force_x - drag * velocity[0], force_y - drag * velocity[1]
+        if hidden.fan is not None:
+            blow_x, blow_y = self._blow(x, y, time_s)
+            force_x, force_y = force_x + blow_x, force_y + blow_y
         return float(force_x), float(force_y)
 
+    def _blow(self, x: float, y: float, time_s: float) -> tuple[float, float]:
+        """Force of a fan that swings to and fro about the field's middle [N]: away from it, and in its beam only."""
+        fan_x, fan_y, push, period, phase = self._hidden.fan or (0.0, 0.0, 0.0, 1.0, 0.0)
+        off_x, off_y = x - fan_x, y - fan_y
+        swing = _FAN_SWINGS * math.sin(2.0 * math.pi * time_s / period + phase)
+        aim = math.atan2(FIELD[1] / 2.0 - fan_y, FIELD[0] / 2.0 - fan_x) + swing
+        aside = math.remainder(math.atan2(off_y, off_x) - aim, 2.0 * math.pi)
+        away = math.hypot(off_x, off_y)
+        blown = push * math.exp(-((aside / _FAN_BEAM) ** 2)) * 2.0 / (1.0 + away * away)
+        return blown * off_x / away, blown * off_y / away
+
     def _resist(self, state: mujoco.MjData) -> None:
-        """Torque against each wheel's turning: coefficient x load x radius, and what a strip or the frame holds."""
+        """Torque against each wheel's turning: coefficient x load x radius, and what floor or frame holds."""
         loads = self._loads(state)
-        sticking, rubbing = self._sticking(state), self._rubbing(state)
+        sticking, rubbing, clinging = self._sticking(state), self._rubbing(state), self._clinging(state)
         axle = state.xmat[self._chassis].reshape(3, 3)[:, 1]
         turning = state.qvel[[6, -1]] if state.qvel.size == 8 else state.qvel[[6, 8]] + state.qvel[[7, 9]]
         for side, body in enumerate(self._wheels):
             brake = self._hidden.rolling_resistance * loads[side] * self._radii[side] + sticking[side]
             brake += rubbing[side]
+            brake += clinging[side]
             state.xfrc_applied[body, 3:] = -brake * math.tanh(turning[side] / _ROLLING_BLEND) * axle
 
     def _sticking(self, state: mujoco.MjData) -> tuple[float, float]:
@@ -232,6 +274,19 @@ class Surroundings:
             across = math.cos(angle) * off_x + math.sin(angle) * off_y
             held.append(most if abs(across) < width / 2.0 else 0.0)
         return held[0], held[1]
+
+    def _clinging(self, state: mujoco.MjData) -> list[float]:
+        """Give the torque with which a patchy floor holds each wheel [N m]: by chance, but everywhere its own."""
+        if self._hidden.patches is None:
+            return [0.0, 0.0]
+        most, wide, pattern = self._hidden.patches
+        heading, held = _heading(state), []
+        for lever in (self._half_track, -self._half_track):
+            column = math.floor((float(state.qpos[0]) - lever * math.sin(heading)) / wide)
+            row = math.floor((float(state.qpos[1]) + lever * math.cos(heading)) / wide)
+            drawn = 43758.5453 * math.sin(12.9898 * column + 78.233 * row + pattern)
+            held.append(most * (drawn - math.floor(drawn)))
+        return held
 
     def _rubbing(self, state: mujoco.MjData) -> list[float]:
         """Give the torque with which the frame holds the wheel that a turn presses on it [N m]."""

@@ -22,6 +22,7 @@ from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.history import History
 from benchmarks.concealed.kinds import ALL_OUTSIDE, SETS
 from benchmarks.concealed.kinds.final import FINAL
+from benchmarks.concealed.kinds.fresh import FRESH
 from benchmarks.concealed.kinds.outside import OUTSIDE
 from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.kinds.unmet import UNMET
@@ -83,7 +84,7 @@ def test_a_camera_sees_its_marker_go_round_the_axle():
     assert seen["heading_deg"] == pytest.approx([90.0, 90.0])
 
 
-@pytest.mark.parametrize("name", [*FINAL, *UNMET])
+@pytest.mark.parametrize("name", [*FINAL, *UNMET, *FRESH])
 def test_each_kind_is_kept_held_by_all_worlds_and_drawn_again_alike(name):
     kind = ALL_OUTSIDE[name]
     (robots, numbers), again = (kind.draw(np.random.default_rng(1), 2, 0.0) for _ in range(2))
@@ -121,7 +122,7 @@ def test_an_old_seed_plans_what_it_planned_before(background, kinds, digest):
     assert hashlib.sha256(told.encode()).hexdigest()[:16] == digest
 
 
-@pytest.mark.parametrize("kinds", ["final", "unmet"])
+@pytest.mark.parametrize("kinds", ["final", "unmet", "fresh"])
 def test_the_command_plans_cases_of_a_set_alone(monkeypatch, tmp_path, kinds):
     drawn = []
     monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))

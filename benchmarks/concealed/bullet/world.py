@@ -109,10 +109,11 @@ class _Robot:
         self._lean(*concealed.tilt)
         still = (concealed.air_drag, concealed.yaw_pull) == (0.0, 0.0)
         pulls = (concealed.tether, concealed.magnet, concealed.pile, concealed.swivel, concealed.trailer)
-        pulls += (concealed.hair, concealed.grooves)
+        pulls += (concealed.hair, concealed.grooves, concealed.fan)
         self._pushed = (
             not still
             or concealed.twist > 0.0
+            or concealed.scrub > 0.0
             or bool(concealed.gusts)
             or any(pull is not None for pull in pulls)
         )
@@ -224,6 +225,10 @@ class _Robot:
                 hidden.tilt[0] + slope * math.sin(wave * x + phase_x),
                 hidden.tilt[1] + slope * math.sin(wave * y + phase_y),
             )
+        if hidden.rocking is not None:
+            slope, _, way, _ = hidden.rocking
+            leaning = slope * chassis.tip(n, memory, x, y, TICK_S)
+            self._lean(hidden.tilt[0] + leaning * math.cos(way), hidden.tilt[1] + leaning * math.sin(way))
         if hidden.patch is None and hidden.dust is None and hidden.hop is None:
             return
         memory[chassis.WHEEL : chassis.WHEEL + 2] = self._angles - self._origin
@@ -238,9 +243,9 @@ class _Robot:
                 )
 
     def _brakes(self, n: Numbers, x: float, y: float, turn: float) -> Array:
-        """Give what holds the tyres [N m]: rolling resistance (coefficient x load x radius) and a sticky strip."""
+        """Give what holds the tyres [N m]: rolling resistance (coefficient x load x radius), a strip, patches."""
         brakes = np.zeros(2)
-        if (n.rolling, n.strip) == (0.0, 0.0):
+        if (n.rolling, n.strip, n.patches) == (0.0, 0.0, 0.0):
             return brakes
         for side, radius in enumerate((n.radius_left, n.radius_right)):
             touching = pybullet.getContactPoints(

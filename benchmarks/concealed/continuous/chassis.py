@@ -16,9 +16,9 @@ from benchmarks.concealed.robot import CASTER_RADIUS, GRAVITY, WHEEL_MASS
 # [rad, rad/s], deflections of both treads and of the caster's contact, ahead and left [m], of the tyres' flexing
 # [rad], force of the floor in the step before, ahead and left [N], way rolled [m], heading of a castor wheel [rad],
 # for how long a contact has been lifted [s], angle turned since the start [rad], place of a weight on a string [m],
-# way of hair wound round the caster [m].
+# way of hair wound round the caster [m], how far a table has tipped and to which side it does.
 X, Y, TURN, VX, VY, RATE, WHEEL, WHEEL_SPEED = 0, 1, 2, 3, 4, 5, 6, 8
-TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, WOUND, SIZE = (
+TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, WOUND, TIPPED, SIZE = (
     10,
     14,
     16,
@@ -30,6 +30,7 @@ TREAD, BALL, FLEX, FLOOR, ROLLED, CASTOR, LIFTED, TURNED, WEIGHT, WOUND, SIZE = 
     24,
     26,
     27,
+    29,
 )
 
 # Brush tyre with a first-order relaxation of the contact (Pacejka, Tire and Vehicle Dynamics, 3rd ed., ch. 3 and 7).
@@ -43,6 +44,11 @@ _FLEX_SLIDES = 0.01  # rad
 _LOAD_FOLLOWS = 0.002  # s: loads follow the floor's forces as quickly as tyres settle
 _DRAG_BLEND = 0.02  # m / s
 _TWIST_SLIPS = 6.0  # rad
+_SCRUB_BLEND = 0.2  # rad / s
+_FAN_SWINGS = 0.7  # rad
+_FAN_BEAM = 0.25  # rad
+_MIDDLE_X, _MIDDLE_Y = 1.2, 0.6  # of the field [m]
+_TIPPING = 0.1  # s
 _RIDGE_RADIUS = 0.20  # m, of the lying cylinder whose cap is the ridge
 STEPS = 10  # of a tick: 0.1 ms; halving it moves nothing that a sensor sees
 
@@ -102,11 +108,7 @@ def _step_body(
     cos, sin = math.cos(b[TURN]), math.sin(b[TURN])
     axle_x, axle_y = b[X] - n.com_ahead * cos, b[Y] - n.com_ahead * sin
     ahead, left = cos * b[VX] + sin * b[VY], cos * b[VY] - sin * b[VX]  # of the centre of mass
-    along_x, along_y = n.tilt_x, n.tilt_y
-    if n.wave > 0.0:
-        wave = 2.0 * math.pi / n.wave_length
-        along_x += n.wave * math.sin(wave * axle_x + n.wave_x)
-        along_y += n.wave * math.sin(wave * axle_y + n.wave_y)
+    along_x, along_y = _slope(n, b, axle_x, axle_y, dt)
     down = math.sqrt(max(1.0 - math.sin(along_x) ** 2 - math.sin(along_y) ** 2, 0.0))
     _share_load(n, b, n.mass * GRAVITY * down, loads, dt)
 
@@ -164,6 +166,21 @@ def _step_body(
 
 
 @numba.njit(cache=True)
+def _slope(n: Numbers, b: npt.NDArray[np.float64], x: float, y: float, dt: float) -> tuple[float, float]:
+    """Advance a table that tips; give the floor's slope here, along x and y [rad]."""
+    along_x, along_y = n.tilt_x, n.tilt_y
+    if n.wave > 0.0:
+        wave = 2.0 * math.pi / n.wave_length
+        along_x += n.wave * math.sin(wave * x + n.wave_x)
+        along_y += n.wave * math.sin(wave * y + n.wave_y)
+    if n.rocking > 0.0:
+        leaning = n.rocking * tip(n, b, x, y, dt)
+        along_x += leaning * math.cos(n.rocking_way)
+        along_y += leaning * math.sin(n.rocking_way)
+    return along_x, along_y
+
+
+@numba.njit(cache=True)
 def _move(
     n: Numbers, b: npt.NDArray[np.float64], force_x: float, force_y: float, torque: float, dt: float
 ) -> None:
@@ -188,12 +205,48 @@ def turned(x: float, y: float, angle: float) -> tuple[float, float]:
 
 @numba.njit(cache=True)
 def sticking(n: Numbers, side: int, x: float, y: float, turn: float) -> float:
-    """Give the torque with which a strip across the floor holds a wheel that stands on it [N m]."""
-    if n.strip == 0.0:
+    """Give the torque with which a strip across the floor, or one of its patches, holds a wheel on it [N m]."""
+    if n.strip == 0.0 and n.patches == 0.0:
         return 0.0
     off_x, off_y = turned(0.0, n.half_track if side == 0 else -n.half_track, turn)
+    if n.patches > 0.0:
+        return n.patches * _drawn(
+            math.floor((x + off_x) / n.patches_size),
+            math.floor((y + off_y) / n.patches_size),
+            n.patches_pattern,
+        )
     across, _ = turned(x + off_x - n.strip_x, y + off_y - 0.6, -n.strip_angle)
     return n.strip if abs(across) < n.strip_width / 2.0 else 0.0
+
+
+@numba.njit(cache=True)
+def _drawn(column: float, row: float, pattern: float) -> float:
+    """Give a number between 0 and 1 that neighbouring places do not share, and the same place always has."""
+    big = math.sin(12.9898 * column + 78.233 * row + pattern) * 43758.5453
+    return big - math.floor(big)
+
+
+@numba.njit(cache=True)
+def tip(n: Numbers, b: npt.NDArray[np.float64], x: float, y: float, dt: float) -> float:
+    """Advance a table that tips to the side of its hinge where the robot is; give how far it has, from -1 to 1."""
+    beyond, _ = turned(x - n.rocking_x, y - _MIDDLE_Y, -n.rocking_way)
+    if abs(beyond) > n.rocking_play:
+        b[TIPPED + 1] = np.sign(beyond)
+    before = b[TIPPED]
+    b[TIPPED] += dt / _TIPPING * (b[TIPPED + 1] - before)
+    return before
+
+
+@numba.njit(cache=True)
+def _blow(n: Numbers, x: float, y: float, time_s: float) -> tuple[float, float]:
+    """Give the force of a fan that swings to and fro: a free jet's, which fades with the distance squared [N]."""
+    off_x, off_y = x - n.fan_x, y - n.fan_y
+    swing = _FAN_SWINGS * math.sin(2.0 * math.pi * time_s / n.fan_period + n.fan_phase)
+    aim_x, aim_y = turned(_MIDDLE_X - n.fan_x, _MIDDLE_Y - n.fan_y, swing)
+    aside = math.atan2(aim_x * off_y - aim_y * off_x, aim_x * off_x + aim_y * off_y)
+    away = math.hypot(off_x, off_y)
+    push = 2.0 * n.fan / (1.0 + away**2) * math.exp(-((aside / _FAN_BEAM) ** 2))
+    return push * off_x / away, push * off_y / away
 
 
 @numba.njit(cache=True)
@@ -380,7 +433,7 @@ def pushes(
     time_s: float,
     dt: float,
 ) -> tuple[float, float, float]:
-    """Force [N] at, and torque [N m] about, the centre of mass from cables, magnets, air, pile and a weight.
+    """Force [N] at, and torque [N m] about, the centre of mass from cables, magnets, air, pile, scrub and a weight.
 
     Parameters
     ----------
@@ -431,6 +484,11 @@ def pushes(
         torque += (n.caster - n.com_ahead) * side * math.cos(b[CASTOR] - turn)
     torque -= n.twist * b[TURNED] / (1.0 + abs(b[TURNED]) / _TWIST_SLIPS)
     b[TURNED] += dt * rate
+    if n.scrub > 0.0:
+        torque -= n.scrub * math.tanh(rate / _SCRUB_BLEND)
+    if n.fan > 0.0:
+        blow_x, blow_y = _blow(n, x, y, time_s)
+        force_x, force_y = force_x + blow_x, force_y + blow_y
     if n.trailer > 0.0:
         haul_x, haul_y, hauling = _haul(n, b, x, y, turn, dt)
         force_x, force_y, torque = force_x + haul_x, force_y + haul_y, torque + hauling
@@ -448,6 +506,8 @@ def start(n: Numbers, x: float, y: float, turn: float) -> npt.NDArray[np.float64
     b[TURN] = b[CASTOR] = turn
     back = n.caster - n.trailer_length  # a weight on a string lies straight behind
     b[WEIGHT], b[WEIGHT + 1] = x + back * math.cos(turn), y + back * math.sin(turn)
+    beyond, _ = turned(x - n.rocking_x, y - _MIDDLE_Y, -n.rocking_way)
+    b[TIPPED] = b[TIPPED + 1] = 1.0 if beyond >= 0.0 else -1.0
     return b
 
 

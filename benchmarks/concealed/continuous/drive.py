@@ -13,9 +13,9 @@ from benchmarks.concealed.continuous.numbers import Numbers
 # State: currents [A], shaft speeds [rad/s], shaft angles [rad], bristle deflections [rad], left and right; then the
 # voltage of the battery's slow branch [V], the voltage at its terminals [V] and what the firmware adds to both duties;
 # then angles at which motors were stopped [rad], share of a grease's stiffness that is left, less one, voltage of a
-# worn battery's slow part [V].
+# worn battery's slow part [V], and how warm the motors' fuses are, against what their rated current makes of them.
 CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT = 0, 2, 4, 6, 8, 9, 10
-HELD, GREASE, SAGGED, SIZE = 12, 14, 15, 16
+HELD, GREASE, SAGGED, WARM, SIZE = 12, 14, 15, 16, 18
 
 # Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
 GEAR_STIFFNESS = 40.0  # N m / rad
@@ -74,6 +74,8 @@ def step_drive(
     if n.sag > 0.0:
         source -= d[SAGGED]
         d[SAGGED] += dt / n.sag_time * (n.sag * drawn - d[SAGGED])
+    if n.loose > 0.0:
+        source -= source * _lost(n, d)
     terminal = source - (1.0 - _SLOW_SHARE) * n.inner_resistance * drawn - d[SLOW]
     d[SLOW] += dt / _SLOW_TIME * (_SLOW_SHARE * n.inner_resistance * drawn - d[SLOW])
     d[TERMINAL] = terminal
@@ -86,6 +88,8 @@ def step_drive(
         torque -= rub if side == 0 else -rub
         if n.grease > 0.0 and n.grease_side == side:
             torque -= _shear(n, d, speed, dt)
+        if n.hum > 0.0 and n.hum_side == side:
+            torque -= _hum(n, speed)
         play = n.play + (n.loosening_left if side == 0 else n.loosening_right) * time_s
         gear = _gear(play / 2.0, angle - wheel_angles[side], speed - wheel_speeds[side])
         d[SPEED + side] += dt * (torque - gear) / n.shaft_inertia
@@ -153,6 +157,22 @@ def _shear(n: Numbers, d: npt.NDArray[np.float64], speed: float, dt: float) -> f
 
 
 @numba.njit(cache=True)
+def _lost(n: Numbers, d: npt.NDArray[np.float64]) -> float:
+    """Give the share of the voltage that is lost at the spring of a cell which the curve pulls away from it."""
+    sideways = n.loose_arm * (d[SPEED + 1] - d[SPEED]) * (d[SPEED + 1] + d[SPEED])
+    if sideways <= 0.0:
+        return 0.0
+    return n.loose / (1.0 + (n.loose_half / sideways) ** 2)
+
+
+@numba.njit(cache=True)
+def _hum(n: Numbers, speed: float) -> float:
+    """Give the torque that shaking the frame takes, most where the gears' rate is the frame's own [N m]."""
+    off = (abs(speed) - n.hum_speed) / n.hum_width
+    return n.hum / (1.0 + off * off) * math.tanh(speed / _DRAG_BLEND)
+
+
+@numba.njit(cache=True)
 def _motor(
     n: Numbers,
     d: npt.NDArray[np.float64],
@@ -172,6 +192,10 @@ def _motor(
     resistance = n.resistance
     if n.heat > 0.0 and n.heat_side == side:
         resistance *= 1.0 + n.heat * (1.0 - math.exp(-time_s / n.heat_time))
+    if n.fuse > 0.0:
+        resistance *= 1.0 + n.fuse * d[WARM + side]
+        heating = (d[CURRENT + side] / n.fuse_current) ** 2
+        d[WARM + side] += dt / n.fuse_time * (heating - d[WARM + side])
     follow = dt / n.inductance
     current = (d[CURRENT + side] + follow * (volts - n.back_emf * speed)) / (1.0 + follow * resistance)
     current = min(max(current, -n.current_limit), n.current_limit)

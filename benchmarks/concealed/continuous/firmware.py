@@ -11,7 +11,7 @@ from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 
 
 class Firmware:
-    """Delay, ramp, pause, rounding, cap, dead band and what wanders, in this order, once a tick.
+    """Throttle, delay, ramp, pause, rounding, cap, dead band and what wanders, in this order, once a tick.
 
     Parameters
     ----------
@@ -25,6 +25,7 @@ class Firmware:
         self._late = round(concealed.actuation_delay / TICK_S)
         self._now = [0.0, 0.0]
         self._polls, self._polled = 0, (0.0, 0.0)  # how often commands were looked for, and those seen last
+        self._asked: list[list[float]] = [[0.0, 0.0], [0.0, 0.0]]  # by motor: duty [%], and when it came [s]
         # By motor: the way it was driven last, and when that ended.
         self._last: list[tuple[float, float]] = [(0.0, -math.inf)] * 2
         self._known: dict[tuple[float, float], tuple[float, float]] = {}
@@ -47,7 +48,11 @@ class Firmware:
         hidden = self._hidden
         lost = hidden.dropouts and any(0.0 <= time_s - start < length for start, length in hidden.dropouts)
         heard = (0.0, 0.0) if lost else command_pct
-        self._issued.append(heard if hidden.latch is None else self._latched(heard, time_s, *hidden.latch))
+        if hidden.latch is not None:
+            heard = self._latched(heard, time_s, *hidden.latch)
+        self._issued.append(
+            heard if hidden.throttle is None else self._spared(heard, time_s, *hidden.throttle)
+        )
         acting = self._issued[-1 - self._late] if self._late < len(self._issued) else (0.0, 0.0)
         most = hidden.command_slew * TICK_S
         if most < math.inf:
@@ -66,6 +71,18 @@ class Firmware:
         gains = [1.0, 1.0]
         gains[side] += float(np.interp(time_s, KNOT_S * np.arange(len(knots)), knots))
         return shares[0] * gains[0], shares[1] * gains[1]
+
+    def _spared(
+        self, heard: tuple[float, float], time_s: float, share: float, after: float
+    ) -> tuple[float, float]:
+        """Spare motors that have been driven alike for long: give less of such a duty."""
+        left = [1.0, 1.0]
+        for side, duty in enumerate(heard):
+            if duty != self._asked[side][0]:
+                self._asked[side] = [duty, time_s]
+            elif time_s >= self._asked[side][1] + after:
+                left[side] -= share
+        return heard[0] * left[0], heard[1] * left[1]
 
     def _latched(
         self, heard: tuple[float, float], time_s: float, period: float, gone: float

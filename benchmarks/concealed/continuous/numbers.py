@@ -131,6 +131,29 @@ class Numbers(NamedTuple):
     holding: float
     grooves: float
     grooves_way: float
+    hum: float
+    hum_speed: float
+    hum_width: float
+    hum_side: float
+    scrub: float
+    fuse: float
+    fuse_current: float
+    fuse_time: float
+    loose: float
+    loose_half: float
+    loose_arm: float
+    fan: float
+    fan_x: float
+    fan_y: float
+    fan_period: float
+    fan_phase: float
+    rocking: float
+    rocking_x: float
+    rocking_way: float
+    rocking_play: float
+    patches: float
+    patches_size: float
+    patches_pattern: float
 
 
 def numbers(concealed: Concealed) -> Numbers:
@@ -167,6 +190,9 @@ def numbers(concealed: Concealed) -> Numbers:
     gear_loss, grease = concealed.gear_loss or (0.0, 0), concealed.grease or (0.0, 1.0, 1.0, 0)
     frame_rub, hair = concealed.frame_rub or (0.0, 1.0, 0), concealed.hair or (0.0, 1.0)
     sag, grooves = concealed.slow_sag or (0.0, 1.0), concealed.grooves or (0.0, 0.0)
+    hum, fuse = concealed.hum or (0.0, 0.0, 1.0, 0), concealed.fuse or (0.0, 1.0, 1.0)
+    loose, fan = concealed.loose_cell or (0.0, 1.0, 1.0), concealed.fan or (0.0, 0.0, 0.0, 1.0, 0.0)
+    rocking, patches = concealed.rocking or (0.0, 0.0, 0.0, 0.0), concealed.patches or (0.0, 1.0, 0.0)
     fields = {
         "mass": base.mass,
         "yaw_inertia": base.yaw_inertia,
@@ -280,6 +306,30 @@ def numbers(concealed: Concealed) -> Numbers:
         "holding": concealed.holding,
         "grooves": grooves[0],
         "grooves_way": grooves[1],
+        "hum": hum[0],
+        "hum_speed": hum[1],
+        "hum_width": hum[2],
+        "hum_side": hum[3],
+        "scrub": concealed.scrub,
+        "fuse": fuse[0],
+        "fuse_current": fuse[1],
+        "fuse_time": fuse[2],
+        "loose": loose[0],
+        "loose_half": loose[1],
+        # Acceleration to the loose side per difference of the wheels' squared speeds, by the robot's file.
+        "loose_arm": loose[2] * base.wheel_radius**2 / base.track_width / 2.0,
+        "fan": fan[2],
+        "fan_x": fan[0],
+        "fan_y": fan[1],
+        "fan_period": fan[3],
+        "fan_phase": fan[4],
+        "rocking": rocking[0],
+        "rocking_x": rocking[1],
+        "rocking_way": rocking[2],
+        "rocking_play": rocking[3],
+        "patches": patches[0],
+        "patches_size": patches[1],
+        "patches_pattern": patches[2],
     }
     return Numbers(**{name: float(number) for name, number in fields.items()})
 

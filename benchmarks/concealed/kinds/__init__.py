@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from benchmarks.concealed.kinds.final import FINAL
+from benchmarks.concealed.kinds.fresh import FRESH
 from benchmarks.concealed.kinds.outside import OUTSIDE, Outside
 from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.kinds.unmet import UNMET
 
-ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET}
+ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET, **FRESH}
 
 MET = "met"
 _KNOWN = {name: kind for name, kind in SEALED.items() if not kind.last}
@@ -17,4 +18,5 @@ SETS: dict[str, dict[str, Outside]] = {
     "last": {**OUTSIDE, **SEALED},  # also those kept for a last examination
     "final": FINAL,  # and no other: had they joined the rest, no seed would draw what it drew before
     "unmet": UNMET,
+    "fresh": FRESH,
 }

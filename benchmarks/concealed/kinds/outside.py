@@ -31,7 +31,7 @@ class Outside:
     needs
         Columns without which it leaves no trace.
     last
-        Whether it is kept for a last examination; of ``FINAL`` and ``UNMET``, every one.
+        Whether it is kept for a last examination; of ``FINAL``, ``UNMET`` and ``FRESH``, every one.
     """
 
     words: str
