@@ -13,7 +13,7 @@ from gecar.world.robot import Robot
 from gecar.world.terms import Term
 
 MOST_NAMED = 8  # recordings
-WORSE = 1.05  # times what it was off by before: a channel that was made worse
+CHANNEL_WORSE = 1.05  # times what it was off by before: a channel that was made worse
 VISIBLE = 1.3  # times what noise leaves: a channel's misfit that is a gap to speak of
 
 
@@ -42,7 +42,7 @@ class Misfit:
     @property
     def is_worse(self) -> bool:
         """Whether the channel is clearly farther off after than before."""
-        return self.after > WORSE * self.before
+        return self.after > CHANNEL_WORSE * self.before
 
     def as_json(self) -> dict[str, float]:
         """Return the three figures as they are written."""

@@ -44,7 +44,7 @@ FEWEST_GROUPS = 5
 # What the simulation itself is trusted to, in steps: so near came the constants of a 3D engine's recordings back.
 TRUST_STEPS = 0.15
 ROUNDS = 4
-WORSE = 1.1  # times the misfit before
+MISFIT_WORSE = 1.1  # times the misfit before
 EXPLAINED = 0.9  # share of the misfit above noise that constants which explain it take away
 COURSE = (
     "line_dx",
@@ -112,7 +112,7 @@ class Calibration:
     def worse(self) -> tuple[str, ...]:
         """Columns in which the new constants do worse on what is held out."""
         return tuple(
-            c for c, m in self.channels.items() if m.after > max(WORSE * m.before, VISIBLE * m.floor)
+            c for c, m in self.channels.items() if m.after > max(MISFIT_WORSE * m.before, VISIBLE * m.floor)
         )
 
     @property

@@ -47,7 +47,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals) -> Writt
         swapped = _with_one_more(without, first, held)
         if swapped and step.effect not in swapped.explained.taken.effects:
             written = swapped
-    written = _in_place_of_parts(written, first, held)
+    written = _in_place_of_laws(written, first, held)
     while len(written.explained.taken.effects) < MOST_EFFECTS:
         more = _with_one_more(written, first, held)
         if more is None:
@@ -61,7 +61,7 @@ def _refitted(written: Written, first: Explanation, fitted: Together) -> Written
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
 
 
-def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) -> Written:
+def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> Written:
     """Exchange a law beside others, or a part of its sum, for an effect that explains about as much, until none does.
 
     A cause of the catalogue goes before a part of a law, unless it explains less by what a name costs.
@@ -81,7 +81,7 @@ def _in_place_of_parts(written: Written, first: Explanation, held: Residuals) ->
         without = replace(_refitted(written, first, fitted), invented=told)
         swapped = _with_one_more(without, first, held, others)
         if swapped and here.problem.cost_of(swapped.explained.taken.physics) <= here.taken.cost + PRICE:
-            return _in_place_of_parts(swapped, first, held)
+            return _in_place_of_laws(swapped, first, held)
     return written
 
 
