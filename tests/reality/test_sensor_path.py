@@ -10,6 +10,7 @@ from support.concealing import EV3
 from test_location import seen_on_the_course
 
 from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.residuals.nuisances import SensorPath
 from gecar.reality.residuals.of_recording import residuals_of
 from gecar.reality.residuals.parting import PATH_KNOWN
@@ -20,6 +21,11 @@ ROWS, BLOCK = 95, 30  # the last block is not full
 RNG = np.random.default_rng(0)
 SLOPES = RNG.normal(0.0, 5.0, (ROWS, 3))
 PATH = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, np.full(ROWS, 2.0), SLOPES, BLOCK)
+
+
+def across(t: np.ndarray) -> np.ndarray:
+    """Return poses of a robot that crosses the course's upper line at 0.3 m/s, shape (rows, 3)."""
+    return np.column_stack([np.full_like(t, 1.2), 0.6 + 0.3 * t, np.full_like(t, 0.5 * np.pi)])
 
 
 def edges(width: float, at: float = 0.0) -> np.ndarray:
@@ -83,3 +89,20 @@ def test_what_readings_leave_however_the_path_is_shifted(
     assert least <= left <= most
     errors = run.reflection_pct - along.readings(EV3.physics)
     assert np.sqrt(np.nanmean(errors**2)) == pytest.approx(unmoved, abs=0.1)
+
+
+def test_a_lag_is_the_same_however_rarely_the_log_was_written() -> None:
+    course, physics = (
+        load_course("paper"),
+        EV3.with_effects({"sensor_lag": {"time_constant_s": 0.011}}).physics,
+    )
+    often = np.arange(0.0, 2.0, 0.01)
+
+    def read(t: np.ndarray) -> np.ndarray:
+        out = np.empty(len(t))
+        floor = course.raster(course.pitch_m)
+        readings_along(t, across(t), 0.0, 0.5, floor, course.pitch_m, physics, np.zeros(3), out)
+        return out
+
+    assert np.ptp(read(often)) > 50.0
+    assert np.abs(read(often[::5]) - read(often)[::5]).max() < 1.0

@@ -17,6 +17,8 @@ from gecar.world.kernel.terms import colour_error, sensor_shift
 
 Array = npt.NDArray[np.float64]
 
+LAG_STEP_S = 0.01  # in which a robot moves by less than a spot's radius; rows of a slow log are farther apart
+
 
 @compiled
 def _along(t: Array, path: Array, at: float, k: int, pose: Array) -> int:
@@ -45,6 +47,35 @@ def _clipped_mean(level: float, sd: float) -> float:
             upper = 0.5 * math.erfc(-z / math.sqrt(2.0))
             total -= side * sd * (z * upper + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
     return total
+
+
+@compiled
+def _seen(
+    time: float,
+    t: Array,
+    path: Array,
+    late: float,
+    raster: npt.NDArray[np.uint8],
+    pitch: float,
+    p: Any,
+    shift: Array,
+    k: int,
+    pose: Array,
+) -> tuple[int, float]:
+    """Return at which row of the path the sensor was at a time of its clock, and what it saw [%]; see below."""
+    k = _along(t, path, time + late - p.sensor_delay, k, pose)
+    heading = pose[2] + shift[2]
+    cos, sin = math.cos(heading), math.sin(heading)
+    x, y = pose[0] + shift[0], pose[1] + shift[1]
+    front = left = 0.0
+    if p.n_terms > 0.0:
+        per_s = 1.0 / (t[k + 1] - t[k])
+        vx, vy = per_s * (path[k + 1, 0] - path[k, 0]), per_s * (path[k + 1, 1] - path[k, 1])
+        turn_rate = per_s * (path[k + 1, 2] - path[k, 2])
+        front, left = sensor_shift(
+            time, x, y, heading, vx * cos + vy * sin, vy * cos - vx * sin, turn_rate, p
+        )
+    return k, spot_reflection(raster, pitch, x, y, cos, sin, front, left, p)
 
 
 @compiled
@@ -79,43 +110,26 @@ def readings_along(
         Overwritten [%], shape (rows,).
     """
     p = physics[0]
-    pose = np.zeros(3)
-    k = 0
+    pose, k = np.zeros(3), 0
     before = now = 0.0
     for i in range(t.shape[0]):
-        k = _along(t, path, t[i] + late - p.sensor_delay, k, pose)
-        heading = pose[2] + shift[2]
-        cos, sin = math.cos(heading), math.sin(heading)
-        front = left = 0.0
-        if p.n_terms > 0.0:
-            per_s = 1.0 / (t[k + 1] - t[k])
-            vx, vy = per_s * (path[k + 1, 0] - path[k, 0]), per_s * (path[k + 1, 1] - path[k, 1])
-            turn_rate = per_s * (path[k + 1, 2] - path[k, 2])
-            x, y = pose[0] + shift[0], pose[1] + shift[1]
-            front, left = sensor_shift(
-                t[i], x, y, heading, vx * cos + vy * sin, vy * cos - vx * sin, turn_rate, p
-            )
-        seen = spot_reflection(
-            raster,
-            pitch,
-            pose[0] + shift[0],
-            pose[1] + shift[1],
-            cos,
-            sin,
-            front,
-            left,
-            p,
-        )
         if i == 0 or p.sensor_lag <= 0.0:
-            now = seen
+            k, now = _seen(t[i], t, path, late, raster, pitch, p, shift, k, pose)
+            before = now
         else:
-            # What is seen runs straight from row to row: a first-order lag's exact answer to a ramp.
             elapsed = t[i] - t[i - 1]
-            keep = math.exp(-elapsed / p.sensor_lag)
-            slope = (seen - before) / elapsed
-            now = seen - slope * p.sensor_lag + (now - before + slope * p.sensor_lag) * keep
-        before = seen
+            pieces = max(math.ceil(elapsed / LAG_STEP_S - 1e-6), 1)
+            piece = elapsed / pieces
+            keep = math.exp(-piece / p.sensor_lag)
+            for j in range(pieces):
+                at = t[i] - (pieces - 1 - j) * piece
+                k, seen = _seen(at, t, path, late, raster, pitch, p, shift, k, pose)
+                # From piece to piece what is seen runs straight: a first-order lag's exact answer to a ramp.
+                slope = (seen - before) / piece
+                now = seen - slope * p.sensor_lag + (now - before + slope * p.sensor_lag) * keep
+                before = seen
         level = p.sensor_gain * now + p.sensor_offset
         if p.n_terms > 0.0:
-            level += colour_error(t[i], pose[0] + shift[0], pose[1] + shift[1], heading, level, p)
+            x, y, heading = pose[0] + shift[0], pose[1] + shift[1], pose[2] + shift[2]
+            level += colour_error(t[i], x, y, heading, level, p)
         readings[i] = _clipped_mean(level, noise)
