@@ -29,6 +29,7 @@ from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import explain, resumed
 from gecar.reality.selection.thresholds import table
+from gecar.world.effects import BY_ID
 from gecar.world.rollout import STEP_S
 
 CLOCK = "clock_skew"
@@ -379,6 +380,18 @@ def test_an_effect_may_end_a_drive_farther_off_if_all_of_it_is_asked_for_and_all
     monkeypatch.setattr(confirmation, "worsens", lambda *_: True)
     monkeypatch.setattr(confirmation, "gaps", lambda *_: (2.0, 1.0 if nearer else 3.0))
     assert confirmation._helps(explained, set_aside([1.0]), step.base, share) == helps  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("scan", ["floor cells", ""])
+def test_a_place_on_the_floor_all_of_which_is_asked_for_stays_though_drives_end_farther_off(
+    monkeypatch: pytest.MonkeyPatch, scan: str
+) -> None:
+    """A drive slightly off its path misses a patch, or slides on it to another side."""
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    monkeypatch.setattr(confirmation, "_helps", lambda *_: False)
+    monkeypatch.setattr(confirmation, "BY_ID", {**BY_ID, VISCOUS: replace(BY_ID[VISCOUS], scan=scan)})
+    proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
+    assert bool(proof.explained.steps) == bool(scan)
 
 
 def test_bounds_of_a_share_hold_the_truth_where_residuals_are_correlated() -> None:

@@ -109,7 +109,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             useless = [
                 s
                 for s, share in judged
-                if s.effect not in places and not _helps(explained, held, without[s.effect], share)
+                if not (s.effect in places or _is_a_place(s, share))
+                and not _helps(explained, held, without[s.effect], share)
             ]
             if not useless:
                 break
@@ -193,6 +194,11 @@ def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
     recording, first_s, last_s = passes[0]
     gaps_s = recording.t_s[recording.gaps] - recording.t_s[0]
     return bool(np.any((gaps_s > first_s - BEFORE_S) & (gaps_s < last_s + SPAN_S)))
+
+
+def _is_a_place(step: Step, share: Share) -> bool:
+    """Whether all of a place on the floor is asked for: a whole drive slightly off its path misses it, and says no."""
+    return BY_ID[step.effect].at_a_place and share.is_whole
 
 
 def _helps(explained: Explanation, held: Residuals, without: Model, share: Share) -> bool:
