@@ -16,6 +16,7 @@ from gecar.reality import discovery
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.sensor_noise import estimate_noise
+from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
@@ -87,6 +88,7 @@ def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
 ) -> None:
     truth, responses = {VISCOUS: 3.0, TRACK: 4.0}, {VISCOUS: bumps(1, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
     held: Any = linear(truth, responses, seed=5)
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, 1.0))  # of no drives
     proof = confirmed(explain(linear_problem(linear(truth, responses))), held)
     assert {step.effect for step in proof.explained.steps} == {VISCOUS, TRACK}
 

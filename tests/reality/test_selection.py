@@ -47,6 +47,12 @@ class SteppedResiduals(LinearResiduals):
         return replace(self, truth={effect: side * size for effect, size in self.truth.items()})
 
 
+@pytest.fixture(autouse=True)
+def drives_as_far_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linear residuals are of no drive that could be replayed whole."""
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, 1.0))
+
+
 def test_a_clock_that_fits_only_as_the_steps_fall_is_no_candidate() -> None:
     responses, truth = {CLOCK: bumps(1, 4, 1.0)}, {CLOCK: 2.0}
     always, stepped = linear(truth, responses), linear(truth, responses)
@@ -392,6 +398,18 @@ def test_a_place_on_the_floor_all_of_which_is_asked_for_stays_though_drives_end_
     monkeypatch.setattr(confirmation, "BY_ID", {**BY_ID, VISCOUS: replace(BY_ID[VISCOUS], scan=scan)})
     proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
     assert bool(proof.explained.steps) == bool(scan)
+
+
+@pytest.mark.parametrize(("now", "kept"), [(1.9, True), (2.1, False)])
+def test_what_takes_whole_drives_twice_as_far_off_is_a_candidate(
+    monkeypatch: pytest.MonkeyPatch, now: float, kept: bool
+) -> None:
+    """Beside small changes that made up for it, tyres that resist turning asked for all of a caster's drag."""
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, now))
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
+    assert bool(proof.explained.steps) == kept
+    assert bool(proof.candidates) != kept
 
 
 def test_bounds_of_a_share_hold_the_truth_where_residuals_are_correlated() -> None:
