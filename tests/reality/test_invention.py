@@ -373,10 +373,29 @@ def test_of_a_law_that_recordings_set_aside_do_not_show_the_others_decide(monkey
     assert sentences(verdict)[1].startswith("What was found does not show in ")
 
 
-def test_a_further_law_must_show_in_recordings_set_aside(monkeypatch):
+@pytest.fixture
+def proved_law(monkeypatch):
+    """Let one law be proved, of one size."""
     for name in ("added", "pruned", "_told", "_indistinguishable"):
         monkeypatch.setattr(invention, name, lambda *_: Written(None, (), ()))
     monkeypatch.setattr(invention, "_proved", lambda *_: iter([(None, None)]))
+    monkeypatch.setattr(invention, "_spread", lambda *_: 0.0)
+
+
+def test_a_law_of_uneven_size_that_leaves_much_of_a_large_error_is_refused(monkeypatch, proved_law):
+    """What comes at random has a mean, as a radio that drops out brakes a robot."""
+    monkeypatch.setattr(invention, "_gain_set_aside", lambda *_: 9.0)
+    problem = SimpleNamespace(on_bench=False, material=SimpleNamespace(times=lambda left: left))
+    monkeypatch.setattr(invention, "left_before", lambda _: 20.0)
+    for spread, left, holds in ((0.2, 10.0, False), (0.1, 10.0, True), (0.2, 5.0, True)):
+        explained = SimpleNamespace(problem=problem, left=left)
+        monkeypatch.setattr(invention, "_spread", lambda *_, spread=spread: spread)
+        monkeypatch.setattr(invention, "pruned", lambda *_, e=explained: Written(e, (), ()))
+        found = invention._first_that_holds(Written(None, (), ()), None, None, [], None, None)
+        assert (found is not None) == holds
+
+
+def test_a_further_law_must_show_in_recordings_set_aside(monkeypatch, proved_law):
     held = SimpleNamespace(recordings=["one"])
     for gain, terms, holds in ((0.0, (), True), (0.0, ("law",), False), (9.0, ("law",), True)):
         monkeypatch.setattr(invention, "_gain_set_aside", lambda *_, gain=gain: gain)
