@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.concealing import EV3, recorded
 
 pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the concealed cases are not tested (pip install gecar[test])"
@@ -24,7 +25,7 @@ import benchmarks
 from benchmarks import invention
 from benchmarks.concealed import cases, commands, practice, program
 from benchmarks.concealed.colour_sensor import line_share
-from benchmarks.concealed.comparators.methods import METHODS, changed
+from benchmarks.concealed.comparators.methods import METHODS, changed, open_loop_residuals_of
 from benchmarks.concealed.drive_train import DriveTrain
 from benchmarks.concealed.exam import Terms, agreed
 from benchmarks.concealed.history import replayed
@@ -41,7 +42,9 @@ from benchmarks.concealed.tables import draw, report
 from benchmarks.concealed.truth import Truth
 from gecar.parallel import run_parallel
 from gecar.parallel.executors import SerialExecutor
+from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove import confirmation
+from gecar.reality.residuals.of_recording import residuals_of
 from gecar.world.effects import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
@@ -289,6 +292,16 @@ def test_comparators_can_be_called_as_the_parts_that_they_replace(name):
         by_place = [each.name for each in asked if each.default is each.empty]
         by_name = {each.name: each.default for each in asked if each.default is not each.empty}
         inspect.signature(other).bind(*by_place, **by_name)
+
+
+def test_open_loop_residuals_are_of_each_of_several_robots():
+    run = recorded(EV3, 0, seconds=2.0)
+    noise = estimate_noise([run], EV3.physics, 1.0)
+    robots = np.concatenate([EV3.physics, EV3.with_effects({"track_width": {"scale": 1.1}}).physics])
+    closed, opened = (of(run, noise, 1.0, None) for of in (residuals_of, open_loop_residuals_of))
+    errors = opened.motion_errors(robots)
+    assert errors.shape == closed.motion_errors(robots).shape
+    assert np.nanmax(np.abs(errors[1])) > np.nanmax(np.abs(errors[0]))
 
 
 def test_every_benchmark_can_be_imported():

@@ -146,9 +146,9 @@ class OpenLoop(RecordingResiduals):
     open_start: Array = field(default_factory=lambda: np.zeros(3))
 
     def motion_errors(self, physics: npt.NDArray[Any]) -> Array:
-        """Return the residuals of motion open loop."""
-        _, rows, _, poses = self._whole.play(physics, self.open_start)
-        return np.concatenate([rows.T.ravel(), poses.T.ravel()])
+        """Return the residuals of motion open loop under m physics records, shape (m, n)."""
+        played = (self._whole.play(physics[k : k + 1], self.open_start) for k in range(len(physics)))
+        return np.stack([np.r_[p.row_errors.T.ravel(), p.pose_errors.T.ravel()] for p in played])
 
     @property
     def _whole(self) -> Replayer:
