@@ -12,7 +12,7 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the fresh kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE, driven
+from support.concealed_worlds import HERE, assert_felt_alike, changes, driven
 
 from benchmarks.concealed import cases
 from benchmarks.concealed.cases import Manner, draw_case
@@ -59,18 +59,12 @@ NOTHING = {
 @pytest.fixture(scope="module")
 def in_mujoco():
     """How each thing changes the last pose in MuJoCo's world."""
-    return [
-        driven("mujoco", Concealed(**f), duties) - driven("mujoco", NEUTRAL, duties) for f, duties, *_ in FELT
-    ]
+    return changes("mujoco", FELT)
 
 
 @pytest.mark.parametrize("world", HERE)
 def test_each_thing_concealed_moves_the_robot_as_it_should_and_as_far_as_elsewhere(world, in_mujoco):
-    for (fields, duties, part, wanted), there in zip(FELT, in_mujoco, strict=True):
-        change = (driven(world, Concealed(**fields), duties) - driven(world, NEUTRAL, duties))[part]
-        assert abs(change) > 1e-3, fields
-        assert math.copysign(1.0, change) == wanted, fields
-        assert change == pytest.approx(there[part], rel=0.15), fields
+    assert_felt_alike(world, FELT, in_mujoco)
 
 
 @pytest.mark.parametrize("world", HERE)

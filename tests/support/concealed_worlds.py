@@ -1,9 +1,11 @@
 """The worlds of the concealed cases that can be tested here."""
 
 import importlib.util
+import math
 
 import pytest
 
+from benchmarks.concealed.robot import NEUTRAL, Concealed
 from benchmarks.concealed.worlds import WORLDS, truth
 
 HERE = [
@@ -26,3 +28,19 @@ def driven(world, concealed, duties):
         (0.0, 0.6, 0.0), lambda time_s, _: duties[min(int(time_s / 0.5), most)], 0.5 * len(duties)
     )
     return history.pose[-1]
+
+
+def changes(world, felt):
+    """How each thing concealed changes the last pose; ``felt`` as in `assert_felt_alike`."""
+    return [driven(world, Concealed(**f), duties) - driven(world, NEUTRAL, duties) for f, duties, *_ in felt]
+
+
+def assert_felt_alike(world, felt, elsewhere):
+    """Each thing must move the robot as it should, and as far as elsewhere.
+
+    ``felt``: what is concealed, the duties, and how which part of the last pose differs from nominal.
+    """
+    for (fields, _, part, wanted), here, there in zip(felt, changes(world, felt), elsewhere, strict=True):
+        assert abs(here[part]) > 1e-3, fields
+        assert math.copysign(1.0, here[part]) == wanted, fields
+        assert here[part] == pytest.approx(there[part], rel=0.15), fields
