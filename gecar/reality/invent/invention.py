@@ -204,7 +204,7 @@ def _first_that_holds(
     """
     for law, proof in _proved(library, found, nulls):
         more = pruned(added(written, first, library, law), first)
-        if _spread(library, law) >= UNEVEN and _is_much(more.explained):
+        if _spread(library, law) >= UNEVEN and _leaves_much(more.explained):
             continue
         gain = _gain_set_aside(written.explained, more.explained, held)
         unseen = gain == 0.0 and held.recordings
@@ -239,7 +239,7 @@ def _has_one_size(library: Library, law: Law) -> bool:
     return not flickers(library.problem.residuals, library.model.physics, physics)
 
 
-def _is_much(explained: Explanation) -> bool:
+def _leaves_much(explained: Explanation) -> bool:
     """Whether a law leaves much of a large error: what comes at random has a mean, which is all that it explains."""
     problem = explained.problem
     left = problem.material.times(explained.left)

@@ -110,8 +110,7 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             useless = [
                 s
                 for s, share in judged
-                if not (s.effect in places or _is_a_place(s, share))
-                and not _helps(explained, held, without[s.effect], share)
+                if not _is_missed(s, share) and not _helps(explained, held, without[s.effect], share)
             ]
             if not useless:
                 break
@@ -197,9 +196,12 @@ def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
     return bool(np.any((gaps_s > first_s - BEFORE_S) & (gaps_s < last_s + SPAN_S)))
 
 
-def _is_a_place(step: Step, share: Share) -> bool:
-    """Whether all of a place on the floor is asked for: a whole drive slightly off its path misses it, and says no."""
-    return BY_ID[step.effect].at_a_place and share.is_whole
+def _is_missed(step: Step, share: Share) -> bool:
+    """Whether whole drives cannot judge an effect: a place that recordings do not show, or all of which they ask for.
+
+    A drive slightly off its path misses it.
+    """
+    return BY_ID[step.effect].at_a_place and (share is UNSEEN or share.is_whole)
 
 
 def _helps(explained: Explanation, held: Residuals, without: Model, share: Share) -> bool:
@@ -211,18 +213,14 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
     it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    if not (held.sensor or problem.on_bench):
-        was, now = _gaps(problem, without, explained.taken, held)
-        if now > FARTHER * was:
-            return False
+    was, now = _gaps(problem, without, explained.taken, held)
+    if now > FARTHER * was and not (held.sensor or problem.on_bench):
+        return False
     if not explained.unexplained or share.is_whole:
-        if not worsens(problem, without, explained.taken, sizes):
-            return True
-        was, now = _gaps(problem, without, explained.taken, held)
-        return share.is_whole and now < was
+        return not worsens(problem, without, explained.taken, sizes) or (share.is_whole and now < was)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
-    now, before = (problem.material.times(sizes.left(physics)) for physics in beside)
-    return now**2 < (1.0 - MAIN_SHARE) * before**2
+    left, before = (problem.material.times(sizes.left(physics)) for physics in beside)
+    return left**2 < (1.0 - MAIN_SHARE) * before**2
 
 
 def _gaps(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> tuple[float, float]:

@@ -62,7 +62,10 @@ def _seen(
     k: int,
     pose: Array,
 ) -> tuple[int, float]:
-    """Return at which row of the path the sensor was at a time of its clock, and what it saw [%]; see below."""
+    """Return the path's row at a time of the sensor's clock, and what the sensor saw then [%].
+
+    Arguments are those of `readings_along`; the search begins at row ``k``, and ``pose`` is overwritten.
+    """
     k = _along(t, path, time + late - p.sensor_delay, k, pose)
     heading = pose[2] + shift[2]
     cos, sin = math.cos(heading), math.sin(heading)
