@@ -24,7 +24,9 @@ class Blocks:
     Attributes
     ----------
     folds
-        What is left out together, shape (n,).
+        What is left out together, shape (n,): recordings, or thirds of the time of each where there are one or two.
+    parts
+        The same, but sixths of the only recording, shape (n,): three parts hardly tell how much they differ by.
     spans
         Half-second spans, shape (n,).
     count
@@ -36,7 +38,8 @@ class Blocks:
     """
 
     def __init__(self, index: ResidualIndex) -> None:
-        self.folds = _folds(index)
+        self.folds = _folds(index, 3)
+        self.parts = self.folds if index.recording.any() else _folds(index, 6)
         self.spans = _group(index, SPAN_S)
         self._of = _group(index, BLOCK_S)
         self.count = int(self._of.max()) + 1 if len(self._of) else 0
@@ -144,14 +147,14 @@ def _first(of: npt.NDArray[np.int64], values: npt.NDArray[np.int32]) -> npt.NDAr
     return out
 
 
-def _folds(index: ResidualIndex) -> npt.NDArray[np.int32]:
-    """Return what is left out together: recordings, or thirds of the time where there are too few."""
+def _folds(index: ResidualIndex, parts: int) -> npt.NDArray[np.int32]:
+    """Return what is left out together: recordings, or so many parts of the time of each where there are too few."""
     if len(index.recording) and index.recording.max() >= 2:
         return index.recording
     if not len(index.t_s):
         return np.zeros(0, np.int32)
-    third = np.minimum((3.0 * index.t_s / max(index.t_s.max(), 1e-9)).astype(np.int32), 2)
-    return (3 * index.recording + third).astype(np.int32)
+    part = np.minimum((parts * index.t_s / max(index.t_s.max(), 1e-9)).astype(np.int32), parts - 1)
+    return (parts * index.recording + part).astype(np.int32)
 
 
 def _group(index: ResidualIndex, length_s: float) -> npt.NDArray[np.int64]:

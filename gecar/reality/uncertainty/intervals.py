@@ -33,8 +33,8 @@ def half_widths(estimator: Estimator, model: Model) -> Array:
     """Return half the 95 % intervals of a model's coordinates, shape (k,).
 
     The largest of three: what the noise as it is known to be makes of them, which is without bound along a valley; a
-    sandwich over half-second spans, which holds whatever the noise's correlation; and the jackknife over recordings
-    with Student's t, which also holds what no noise model knows.
+    sandwich over half-second spans, which holds whatever the noise's correlation; and the jackknife over recordings,
+    or parts of one, with Student's t, which also holds what no noise model knows.
 
     Sources: White, Econometrica 48 (1980) 817; Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
     """
@@ -49,17 +49,17 @@ def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
     scores = np.stack([np.bincount(blocks.spans, s * w * errors) for s in slopes.T], axis=1)
     variances = np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), np.diag(inverse))
     leaps = []
-    for k in np.unique(blocks.folds):
-        rows = blocks.folds == k
+    for k in np.unique(blocks.parts):
+        rows = blocks.parts == k
         part = slopes[rows].T @ (w[rows, None] * slopes[rows])
         leaps.append(
             np.linalg.pinv(normal - part, hermitian=True) @ (slopes[rows].T @ (w[rows] * errors[rows]))
         )
-    folds = len(leaps)
-    if folds < 2:
+    parts = len(leaps)
+    if parts < 2:
         return NORMAL_95 * np.sqrt(variances)
-    jack = (folds - 1) / folds * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
-    return np.maximum(NORMAL_95 * np.sqrt(variances), stdtrit(folds - 1, 0.975) * np.sqrt(jack))
+    jack = (parts - 1) / parts * np.sum((np.array(leaps) - np.mean(leaps, axis=0)) ** 2, axis=0)
+    return np.maximum(NORMAL_95 * np.sqrt(variances), stdtrit(parts - 1, 0.975) * np.sqrt(jack))
 
 
 def model_error(c: Coordinate, z: float) -> float:
