@@ -385,7 +385,29 @@ def test_an_effect_may_end_a_drive_farther_off_if_all_of_it_is_asked_for_and_all
     (step,) = explained.steps
     monkeypatch.setattr(confirmation, "worsens", lambda *_: True)
     monkeypatch.setattr(confirmation, "gaps", lambda *_: (2.0, 1.0 if nearer else 3.0))
-    assert confirmation._helps(explained, set_aside([1.0]), step.base, share) == helps  # type: ignore[arg-type]
+    assert confirmation._helps(explained, set_aside([1.0]), step, step.base, share) == helps  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("share", "steady", "nearer", "helps"),
+    [
+        (Share(0.8, 0.4, 1.2), True, True, True),
+        (Share(0.8, 0.4, 1.2), True, False, False),
+        (Share(0.8, 0.4, 1.2), False, True, False),  # its size differs between the recordings fitted on
+        (Share(0.6, 0.4, 0.8), True, True, False),  # those set aside surely ask for less
+    ],
+)
+def test_beside_much_that_is_left_an_effect_of_one_size_must_only_end_drives_nearer(
+    monkeypatch: pytest.MonkeyPatch, share: Share, steady: bool, nearer: bool, helps: bool
+) -> None:
+    """A ripple of the torque hardly shows where drives end that gusts have pushed about."""
+    explained = replace(explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES))), unexplained=True)
+    (step,) = explained.steps
+    monkeypatch.setattr(confirmation, "MAIN_SHARE", 1.0)  # none explains all of it
+    monkeypatch.setattr(confirmation, "worsens", lambda *_: False)
+    monkeypatch.setattr(confirmation, "stands_out", lambda *_: steady)
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (2.0, 1.9 if nearer else 2.1))
+    assert confirmation._helps(explained, set_aside([1.0]), step, step.base, share) == helps  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("scan", ["floor cells", ""])

@@ -15,7 +15,7 @@ from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, gaps, reading_error
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.residuals.of_case import Residuals
-from gecar.reality.selection.acceptance import most_uneven, worsens
+from gecar.reality.selection.acceptance import most_uneven, stands_out, worsens
 from gecar.reality.selection.cross_validation import refitted_errors
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import (
@@ -110,7 +110,7 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             useless = [
                 s
                 for s, share in judged
-                if not _is_missed(s, share) and not _helps(explained, held, without[s.effect], share)
+                if not _is_missed(s, share) and not _helps(explained, held, s, without[s.effect], share)
             ]
             if not useless:
                 break
@@ -204,13 +204,15 @@ def _is_missed(step: Step, share: Share) -> bool:
     return BY_ID[step.effect].at_a_place and (share is UNSEEN or share.is_whole)
 
 
-def _helps(explained: Explanation, held: Residuals, without: Model, share: Share) -> bool:
+def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, share: Share) -> bool:
     """Whether whole drives set aside come out no worse with an effect.
 
     None may take all channels together twice as far off, whatever small changes would make up for it.
     They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray. Then
     it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
+    What has one size in all recordings fitted on, and as far as can be told in those set aside, must come out nearer,
+    but not much: a ripple of the torque hardly shows where a drive ends that gusts have pushed about.
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     was, now = _gaps(problem, without, explained.taken, held)
@@ -220,7 +222,10 @@ def _helps(explained: Explanation, held: Residuals, without: Model, share: Share
         return not worsens(problem, without, explained.taken, sizes) or (share.is_whole and now < was)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     left, before = (problem.material.times(sizes.left(physics)) for physics in beside)
-    return left**2 < (1.0 - MAIN_SHARE) * before**2
+    if left**2 < (1.0 - MAIN_SHARE) * before**2:
+        return True
+    nearer = now < was and not worsens(problem, without, explained.taken, sizes)
+    return nearer and share.low < 1.0 < share.high and stands_out(problem, step)
 
 
 def _gaps(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> tuple[float, float]:
