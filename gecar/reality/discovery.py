@@ -53,7 +53,7 @@ from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import Explanation, explain, left_before, left_share, resumed
 from gecar.reality.selection.thresholds import NEGLIGIBLE, PRICE, SIGNIFICANCE
-from gecar.reality.uncertainty.intervals import contains_neutral, hulls, intervals
+from gecar.reality.uncertainty.intervals import hulls, intervals, weakest_absent
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
 from gecar.reality.verdict import (
@@ -499,10 +499,9 @@ def _with_intervals(context: _Context, confirmation: Confirmation, held: Residua
     context.tell("intervals")
     while True:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
-        absent = [s for s in explained.steps if contains_neutral(explained.taken, s.effect, spans)]
-        if not absent:
+        weakest = weakest_absent(explained.taken, explained.steps, spans)
+        if weakest is None:
             break
-        weakest = min(absent, key=lambda step: step.gain)
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)
     return _Stage(explained, candidates, confirmation.unseen, _spans(context, explained, spans), held)
 

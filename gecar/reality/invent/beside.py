@@ -27,7 +27,7 @@ from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
 from gecar.reality.selection.thresholds import MOST_EFFECTS, PRICE
-from gecar.reality.uncertainty.intervals import contains_neutral, intervals
+from gecar.reality.uncertainty.intervals import intervals, weakest_absent
 from gecar.reality.verdict import Invented
 from gecar.world.terms import Term
 
@@ -158,15 +158,13 @@ def pruned(written: Written, first: Explanation) -> Written:
 
 def without_absent(written: Written, first: Explanation, seed: int) -> Written:
     """Drop, one by one, the effects that may as well be absent beside the laws, as their interval says."""
-    while written.explained.steps:
+    while True:
         here = written.explained
         spans = intervals(here.problem.estimator, here.taken, seed)
-        absent = [step for step in here.steps if contains_neutral(here.taken, step.effect, spans)]
-        if not absent:
-            break
-        weakest = min(absent, key=lambda step: step.gain)
+        weakest = weakest_absent(here.taken, here.steps, spans)
+        if weakest is None:
+            return written
         written = _refitted(written, first, fitted_without(written, first, weakest))
-    return written
 
 
 def lessened(beside: Explanation, laws: tuple[Term, ...], first: Explanation) -> list[Step]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
-from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Coordinate
 from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
@@ -86,6 +86,14 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
     return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
+
+
+def weakest_absent(
+    model: Model, steps: Sequence[Step], spans: Mapping[str, Mapping[str, Interval]]
+) -> Step | None:
+    """Return the effect that gains least of those that may as well be absent, by their intervals; None if none may."""
+    absent = [step for step in steps if contains_neutral(model, step.effect, spans)]
+    return min(absent, key=lambda step: step.gain, default=None)
 
 
 def _is_place(model: Model, spans: Mapping[str, Interval]) -> bool:
