@@ -18,11 +18,18 @@ from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.residuals.nuisances import Nuisances, SensorPath
 from gecar.reality.residuals.of_case import motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import explain
-from gecar.reality.uncertainty.intervals import contains_neutral, half_widths, hulls, intervals
+from gecar.reality.uncertainty.intervals import (
+    _along_surer_paths,
+    contains_neutral,
+    half_widths,
+    hulls,
+    intervals,
+)
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID
 
@@ -65,6 +72,17 @@ def test_the_only_recording_is_left_out_by_sixths() -> None:
     assert np.unique(blocks.folds).tolist() == [0, 1, 2]
     assert np.unique(blocks.parts).tolist() == [0, 1, 2, 3, 4, 5]
     assert np.all(np.diff(blocks.parts[np.argsort(t_s, kind="stable")]) >= 0)
+
+
+@pytest.mark.parametrize(("slow_mm", "widest_mm"), [(1.74, 8.54), (0.59, 5.47)])
+def test_a_spot_may_be_as_wide_as_it_looks_where_what_a_model_leaves_is_no_noise_of_the_path(
+    slow_mm: float, widest_mm: float
+) -> None:
+    """Beside a radio that drops out edges seemed sharper than the path was known: a spot of 8 mm was told as 4.8."""
+    path = SensorPath(np.zeros((1, 3)), 0.0, slow_mm / 1e3, 0.59e-3)
+    run = SimpleNamespace(nuisances=Nuisances(path=path))
+    estimator = SimpleNamespace(residuals=SimpleNamespace(recordings=(run, run)))
+    assert _along_surer_paths(estimator, 5.47e-3) == pytest.approx(widest_mm / 1e3, abs=1e-5)  # type: ignore[arg-type]
 
 
 def test_a_profile_refits_the_others() -> None:

@@ -20,7 +20,7 @@ from gecar.world.course.course import load_course
 ROWS, BLOCK = 95, 30  # the last block is not full
 RNG = np.random.default_rng(0)
 SLOPES = RNG.normal(0.0, 5.0, (ROWS, 3))
-PATH = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, np.full(ROWS, 2.0), SLOPES, BLOCK)
+PATH = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, 0.001, np.full(ROWS, 2.0), SLOPES, BLOCK)
 
 
 def across(t: np.ndarray) -> np.ndarray:
@@ -55,7 +55,7 @@ def test_a_reading_that_is_not_there_says_nothing_of_others() -> None:
     errors = RNG.normal(size=(1, ROWS))
     own_sd, slopes = np.full(ROWS, 2.0), SLOPES.copy()
     own_sd[5], slopes[5], errors[0, 5] = np.nan, np.nan, np.nan
-    beside = SensorPath(PATH.poses, 0.0, 0.001, own_sd, slopes, BLOCK).whitened(errors)
+    beside = SensorPath(PATH.poses, 0.0, 0.001, 0.001, own_sd, slopes, BLOCK).whitened(errors)
     there = np.arange(ROWS) != 5
     assert np.isfinite(beside[0, there]).all()
     assert np.isnan(beside[0, 5])
@@ -65,7 +65,7 @@ def test_an_edge_that_comes_early_is_the_paths_error_and_one_that_is_wider_is_no
     # A path known to 3 mm: per reading, both would drown in it.
     slopes = np.zeros((ROWS, 3))
     slopes[:, 0] = 15.0 * (edges(4.0, at=0.1) - edges(4.0, at=-0.1))
-    path = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, np.full(ROWS, 1.0), slopes, BLOCK)
+    path = SensorPath(np.zeros((ROWS, 3)), 0.0, 0.001, 0.001, np.full(ROWS, 1.0), slopes, BLOCK)
     early, wider = (each - edges(4.0) for each in (edges(4.0, at=-0.3), edges(5.0)))
     assert left_of(early, path) < 0.01
     assert left_of(wider, path) > 0.5

@@ -75,7 +75,7 @@ def _with_laws(run: RecordingResiduals, robot: Robot) -> None:
 
 
 def _readings(run: RecordingResiduals, robot: Robot) -> None:
-    path = SensorPath(np.zeros((len(run.recording.t_s), 3)), 0.0, 0.001)
+    path = SensorPath(np.zeros((len(run.recording.t_s), 3)), 0.0, 0.001, 0.001)
     run.with_nuisances(Nuisances(path=path)).readings(robot.physics)
 
 

@@ -28,8 +28,9 @@ class SensorPath:
         Of the axle's centre at every row, shape (rows, 3) [m, m, rad].
     late_s
         How late the camera's clock was taken to be when the path was made [s].
-    blur_m
-        Standard deviation of its positions [m]; an uncertain path sees edges blurred on average.
+    blur_m, least_blur_m
+        Standard deviation of its positions, with slow noise and without [m]; an uncertain path sees edges blurred on
+        average.
     own_sd
         Standard deviation of each reading by itself: of the sensor, and of what the path's error changes from row to
         row, shape (rows,) [%]; nan: not compared.
@@ -42,6 +43,7 @@ class SensorPath:
     poses: Array
     late_s: float
     blur_m: float
+    least_blur_m: float
     own_sd: Array = field(default_factory=lambda: np.zeros(0))
     slopes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     block: int = 1

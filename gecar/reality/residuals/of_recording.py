@@ -114,13 +114,19 @@ class RecordingResiduals:
         # An uncertain path sees edges blurred: on the mean, a spot that is larger by as much sees the same. Slow noise
         # is not smoothed away: over a block it stays, over the smoothing's blocks it adds up.
         if self.nuisances.start is not None:
-            sd = smeared = ODOMETRY_SD
+            sd = smeared = least = ODOMETRY_SD
         else:
-            sd = self.noise.path_sd * np.sqrt(inflation)
-            smeared = self.noise.path_sd * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
-        blur = float(np.hypot(smeared[0], float(physics["sensor_ahead"][0]) * smeared[2])) / PATH_CAUTION
+            least = self.noise.path_sd
+            sd, smeared = (
+                least * np.sqrt(inflation),
+                least * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0)),
+            )
+        ahead = float(physics["sensor_ahead"][0])
+        blur, least_blur = (
+            float(np.hypot(each[0], ahead * each[2])) / PATH_CAUTION for each in (smeared, least)
+        )
         block = max(round(PATH_LASTS_S / float(np.median(np.diff(self.replayer.t)))), 1)
-        path = SensorPath(poses, late, blur, block=block)
+        path = SensorPath(poses, late, blur, least_blur, block=block)
         found = self.with_nuisances(replace(self.nuisances, path=path))
         return found.with_uncertain_path(physics, sd, QUICK)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from gecar.reality.fitting.parameters import Coordinate
 from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.residuals.of_recording import DISC_SPREAD
 from gecar.reality.selection.thresholds import ALIKE
 from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
@@ -23,6 +25,7 @@ from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
+SPOT = "spot_diameter"
 NORMAL_95 = 1.96
 KNOWN = 3.0  # times its lower end, the upper end of a radius that is known
 FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
@@ -157,10 +160,23 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
         reach = NORMAL_95 * model_error(c, z)
         edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
         ends = sorted(c.value(float(end)) for end in edges)
+        if c.parameter.field == SPOT:
+            ends[1] = min(_along_surer_paths(estimator, ends[1]), c.value(float(high[k])))
         out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(
             c.value(z), ends[0], ends[1], c.parameter.unit
         )
     return out
+
+
+def _along_surer_paths(estimator: Estimator, diameter_m: float) -> float:
+    """Return how wide a spot would be if the paths that it was found along had no slow noise [m].
+
+    What a model of the motion leaves counts as slow noise of the camera, and need not be; edges are then wide because
+    the spot is, and not because the path is uncertain.
+    """
+    paths = [run.nuisances.path for run in estimator.residuals.recordings]
+    smeared = np.mean([path.blur_m**2 - path.least_blur_m**2 for path in paths if path is not None])
+    return math.sqrt(diameter_m**2 + DISC_SPREAD**2 * max(float(smeared), 0.0))
 
 
 def hulls(one: Mapping[str, Interval], named: Mapping[str, Interval]) -> dict[str, Interval]:
