@@ -31,7 +31,6 @@ from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 APART_S = 1.5  # between two passes of a place
-FARTHER = 2.0  # times the gap without an effect; of 200 named in 13 examinations one, wrong, had it 11 times
 BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
 
@@ -207,7 +206,7 @@ def _is_missed(step: Step, share: Share) -> bool:
 def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, share: Share) -> bool:
     """Whether whole drives set aside come out no worse with an effect.
 
-    None may take all channels together twice as far off, whatever small changes would make up for it.
+    None may take all channels together a quarter farther off, whatever small changes would make up for it.
     They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray. Then
     it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
@@ -216,7 +215,7 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     was, now = _gaps(problem, without, explained.taken, held)
-    if now > FARTHER * was and not (held.sensor or problem.on_bench):
+    if now > WORSE * was and not (held.sensor or problem.on_bench):
         return False
     if not explained.unexplained or share.is_whole:
         return not worsens(problem, without, explained.taken, sizes) or (share.is_whole and now < was)
