@@ -240,7 +240,7 @@ def _has_one_size(library: Library, law: Law) -> bool:
 
 
 def _leaves_much(explained: Explanation) -> bool:
-    """Whether a law leaves much of a large error: what comes at random has a mean, which is all that it explains."""
+    """Whether much of a large error is left beside a law, as beside one that only describes the mean of noise."""
     problem = explained.problem
     left = problem.material.times(explained.left)
     return not problem.on_bench and left >= MUCH and left >= MOST * left_before(problem)

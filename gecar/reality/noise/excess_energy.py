@@ -148,7 +148,7 @@ def _first(of: npt.NDArray[np.int64], values: npt.NDArray[np.int32]) -> npt.NDAr
 
 
 def _folds(index: ResidualIndex, parts: int) -> npt.NDArray[np.int32]:
-    """Return what is left out together: recordings, or so many parts of the time of each where there are too few."""
+    """Return each residual's group, left out together: its recording, or, of one or two, its part of the time."""
     if len(index.recording) and index.recording.max() >= 2:
         return index.recording
     if not len(index.t_s):

@@ -196,7 +196,7 @@ def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
 
 
 def _is_missed(step: Step, share: Share) -> bool:
-    """Whether whole drives cannot judge an effect: a place that recordings do not show, or all of which they ask for.
+    """Whether an effect is a place that whole drives cannot judge: none shows it, or recordings ask for all of it.
 
     A drive slightly off its path misses it.
     """
@@ -223,8 +223,8 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     left, before = (problem.material.times(sizes.left(physics)) for physics in beside)
     if left**2 < (1.0 - MAIN_SHARE) * before**2:
         return True
-    nearer = now < was and not worsens(problem, without, explained.taken, sizes)
-    return nearer and share.low < 1.0 < share.high and stands_out(problem, step)
+    is_steady = share.low < 1.0 < share.high and stands_out(problem, step)
+    return now < was and is_steady and not worsens(problem, without, explained.taken, sizes)
 
 
 def _gaps(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> tuple[float, float]:

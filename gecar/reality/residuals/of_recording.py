@@ -117,10 +117,8 @@ class RecordingResiduals:
             sd = smeared = least = ODOMETRY_SD
         else:
             least = self.noise.path_sd
-            sd, smeared = (
-                least * np.sqrt(inflation),
-                least * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0)),
-            )
+            sd = least * np.sqrt(inflation)
+            smeared = least * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
         ahead = float(physics["sensor_ahead"][0])
         blur, least_blur = (
             float(np.hypot(each[0], ahead * each[2])) / PATH_CAUTION for each in (smeared, least)

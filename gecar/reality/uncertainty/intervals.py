@@ -18,6 +18,7 @@ from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.residuals.of_recording import DISC_SPREAD
+from gecar.reality.selection.problem import SPOT_SIZE
 from gecar.reality.selection.thresholds import ALIKE
 from gecar.reality.uncertainty.mcmc import TOLERANCE, walked_quantiles
 from gecar.reality.verdict import Interval
@@ -25,7 +26,6 @@ from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
 
-SPOT = "spot_diameter"
 NORMAL_95 = 1.96
 KNOWN = 3.0  # times its lower end, the upper end of a radius that is known
 FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
@@ -94,7 +94,7 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
 def weakest_absent(
     model: Model, steps: Sequence[Step], spans: Mapping[str, Mapping[str, Interval]]
 ) -> Step | None:
-    """Return the effect that gains least of those that may as well be absent, by their intervals; None if none may."""
+    """Return the effect that gains least of those whose intervals hold their neutral values; None if there is none."""
     absent = [step for step in steps if contains_neutral(model, step.effect, spans)]
     return min(absent, key=lambda step: step.gain, default=None)
 
@@ -160,7 +160,7 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
         reach = NORMAL_95 * model_error(c, z)
         edges = np.clip((z - np.hypot(down, reach), z + np.hypot(up, reach)), low[k], high[k])
         ends = sorted(c.value(float(end)) for end in edges)
-        if c.parameter.field == SPOT:
+        if c.effect.id == SPOT_SIZE:
             ends[1] = min(_along_surer_paths(estimator, ends[1]), c.value(float(high[k])))
         out.setdefault(c.effect.id, {})[c.parameter.label] = Interval(
             c.value(z), ends[0], ends[1], c.parameter.unit
@@ -169,7 +169,7 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
 
 
 def _along_surer_paths(estimator: Estimator, diameter_m: float) -> float:
-    """Return how wide a spot would be if the paths that it was found along had no slow noise [m].
+    """Return the diameter of a spot that would fit as well if the paths had no slow noise [m].
 
     What a model of the motion leaves counts as slow noise of the camera, and need not be; edges are then wide because
     the spot is, and not because the path is uncertain.
