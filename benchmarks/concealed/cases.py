@@ -33,7 +33,7 @@ from benchmarks.concealed.recording import (
 from benchmarks.concealed.rehearsal import Act, Rehearsal, along, stacked, tuned
 from benchmarks.concealed.robot import NEUTRAL, Base, Concealed
 from benchmarks.concealed.settings import RUNS, Setting, draw_setting
-from benchmarks.concealed.sizes import is_material, size
+from benchmarks.concealed.sizes import is_far, is_material, size
 from benchmarks.concealed.worlds import truth
 
 KINDS = ("none", "single", "double", "triple", "mixed", "outside")
@@ -357,15 +357,18 @@ def _conceal_tuned(
         def loud(share: float) -> float:
             return loudness * rehearsal.d_prime(shown(share))
 
+        def matters(share: float) -> bool:
+            return is_far(drawn(share).label) and is_material(rehearsal.size(shown(share)))
+
         if case.manner.material:
-            weakest = next((one for one in _FROM_WEAK if is_material(rehearsal.size(shown(one)))), 1.0)
+            weakest = next((one for one in _FROM_WEAK if matters(one)), 1.0)
             quietest = max(loud(weakest), _QUIETEST)
             loudest = max(_LOUDEST, _LOUD_TIMES * quietest)
         low, high = np.log([quietest, loudest])
         target = float(np.exp(low + (high - low) * place))
         share = max(tuned(loud, target), weakest)
         if kind == "mixed" and effect in EFFECTS:
-            while share < 1.0 and not is_material(rehearsal.size(shown(share))):
+            while share < 1.0 and not matters(share):
                 share = min(share + 0.25, 1.0)
         things.append(drawn(share))
     hidden = _hidden(things, off, runs)
