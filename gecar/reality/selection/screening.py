@@ -65,16 +65,27 @@ class _Trial:
         return BY_ID[self.effect].search
 
 
-def candidate_steps(problem: Problem, model: Model) -> list[Step]:
-    """Try every other effect on top of a model; the most promising are fitted in full. Best first."""
+def candidate_steps(problem: Problem, model: Model, before: Sequence[Step] = ()) -> list[Step]:
+    """Try every other effect on top of a model; the most promising are fitted in full. Best first.
+
+    Parameters
+    ----------
+    problem
+        Under the discrepancy the model leaves.
+    model
+        With the effects taken so far.
+    before
+        The stage at which the last of them was taken: what rivalled it is also fitted where they share what it does.
+    """
     estimator = problem.estimator
     others = [effect for effect in problem.tried if effect not in model.effects]
     estimator.sensitivities(model, others)  # all at once, in lock step
     scored = (problem.once("scored", model.key, e, make=partial(_scored, problem, model, e)) for e in others)
     trials = [trial for trial in scored if trial]
     trials.sort(key=lambda t: -t.promise)
+    shared = _sharing(problem, model, before)
     if not trials or trials[0].promise < PROMISING * PRICE:
-        return []
+        return shared
     begun = [
         problem.once("improved", model.key, t.effect, make=partial(_improved, estimator, t))
         for t in trials[:IMPROVED]
@@ -86,7 +97,7 @@ def candidate_steps(problem: Problem, model: Model) -> list[Step]:
         for t, search in ((t, _search_of(t, best)) for t in begun[:REFITTED])
         if t.gain >= NEGLIGIBLE * best
     ]
-    steps.sort(key=lambda s: -s.gain)
+    steps = _best_of_each([*steps, *shared])
     if steps and steps[0].model.excess_energy > DOUBTFUL_FIT * problem.blocks:
         steps[0] = step_of(
             estimator, steps[0].effect, steps[0].base, _searched_about(estimator, steps[0].model)
@@ -111,6 +122,38 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
     promise = max(estimator.linear_gain(model, effect), model.cost - least)
     start = Minimum(kept[0], model.errors, least)
     return _Trial((*model.effects, effect), parameters, start, kept, promise, model)
+
+
+def _sharing(problem: Problem, model: Model, before: Sequence[Step]) -> list[Step]:
+    """Fit what rivalled the effect taken last beside half of that, which was taken for both. Best first.
+
+    A high centre of mass stood in for a lower one on tyres that slip: with all of it, no tyres gained anything.
+    """
+    estimator = problem.estimator
+    best = max((step.gain for step in before), default=0.0)
+    rivals = [s for s in before if s.effect not in model.effects and s.gain > max(COMPETING * best, PRICE)]
+    steps = [
+        problem.once("shared", model.key, rival.model.key, make=partial(_shared, estimator, model, rival))
+        for rival in rivals
+    ]
+    return _best_of_each(steps)
+
+
+def _shared(estimator: Estimator, model: Model, rival: Step) -> Step:
+    """Fit a rival on top of a model from its own size, and that of the others half way between the two models."""
+    effects = (*model.effects, rival.effect)
+    parameters = free_parameters(estimator.robot, effects)
+    ours, theirs = (parameters.vector(values) for values in (model.values, rival.model.values))
+    own = np.array([c.effect.id == rival.effect for c in parameters.coordinates])
+    placed = np.array([not c.effect.differentiable for c in parameters.coordinates])
+    start = np.where(own, theirs, np.where(placed, ours, (ours + theirs) / 2.0))
+    return step_of(estimator, rival.effect, model, estimator.fit(effects, parameters.values(start)))
+
+
+def _best_of_each(steps: Sequence[Step]) -> list[Step]:
+    """Return each effect's best step, best first."""
+    best = {step.effect: step for step in sorted(steps, key=lambda s: s.gain)}
+    return sorted(best.values(), key=lambda s: -s.gain)
 
 
 def _improved(estimator: Estimator, trial: _Trial) -> _Trial:

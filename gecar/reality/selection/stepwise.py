@@ -7,6 +7,7 @@ it gains beside that. Source: forward, backward and stepwise selection, Draper a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -170,7 +171,7 @@ def concluded(
         model = problem.estimator.fit([step.effect for step in named], model.values)
         # What they explain is left, unless small changes of what is known explain it as well.
         left = left_by(problem, model)
-    much = is_much(problem, problem.material.times(left), before, left_share(model.effects))
+    much = is_much(problem, problem.material.times(left), before, left_share(model))
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
@@ -192,7 +193,7 @@ def _standing_beside(
     one that gains least, of the others the most uneven, as it bends the others.
     ``now`` and ``before`` are what is left, with the model and with nothing fitted, in times the material size.
     """
-    if not is_much(problem, now, before, left_share(model.effects)):
+    if not is_much(problem, now, before, left_share(model)):
         return list(steps)
     small = [
         step
@@ -262,10 +263,22 @@ def is_much(problem: Problem, now: float, before: float, allowed: float) -> bool
     return now > least and now / max(before, 1.0) > allowed
 
 
-def left_share(effects: Sequence[str]) -> float:
-    """Return the share of the initial error that effects may leave, because their laws are approximate."""
-    off = (p.model_error for e in effects for p in BY_ID[e].parameters if p.worthwhile > 0.0)
-    return LEFT_SHARE + max(off, default=0.0)
+def left_share(model: Model) -> float:
+    """Return the share of the initial error that a model's effects may leave, because their laws are approximate."""
+    return LEFT_SHARE + max((_off(model, effect) for effect in model.effects), default=0.0)
+
+
+def _off(model: Model, effect: str) -> float:
+    """Return which share of an effect its law is off by: `Parameter.model_error`, and more where the effect is small.
+
+    What the law may be off by in sizes worth a name counts by its standard deviation, half of it; not for what vanishes
+    at infinity.
+    """
+    coordinates = enumerate(model.parameters.coordinates)
+    own = {k: c for k, c in coordinates if c.effect.id == effect and c.parameter.worthwhile > 0.0}
+    size = max(math.hypot(*model.z[list(own)]), 1.0)
+    steps = max((c.parameter.model_error_steps for c in own.values() if not c.inverse), default=0.0)
+    return max((c.parameter.model_error for c in own.values()), default=0.0) + 0.5 * steps / size
 
 
 @dataclass(frozen=True)
@@ -304,7 +317,7 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Cha
             break
         here = problem.under(step.model)
         model = _refitted(here, step.model)
-        stage = tuple(candidate_steps(here, model))
+        stage = tuple(candidate_steps(here, model, stage))
         with_camera = _with_camera(here, model, stage)
         if with_camera is not None:
             return _Chain((), problem.known, (), with_camera)
@@ -339,12 +352,26 @@ def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
-    """Return the chains that begin with a runner-up, where the first took several effects."""
+    """Return the chains that begin with a runner-up, where the first took several effects, or with half of a pair.
+
+    Where it took none, what fits best may be stopped by a bound, or make whole drives worse, for it stands in for two.
+    """
+    rivals = [step for step in first[:BEGINNINGS] if step.gain > max(COMPETING * first[0].gain, PRICE)]
+    if not chain.steps:
+        pairs = (_beginning_with(problem, first, step) for step in rivals)
+        return [pair for pair in pairs if len(pair.steps) > 1]
     if len(chain.steps) < 2:
         return []
-    rivals = [s for s in first[1:BEGINNINGS] if s.gain > COMPETING * first[0].gain and not stopped(s)]
-    chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in rivals]
+    runners_up = [step for step in rivals if step is not first[0] and not stopped(step)]
+    chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
     return [other for other in chains if other is not chain and other.with_camera is None]
+
+
+def _beginning_with(problem: Problem, first: Sequence[Step], step: Step) -> _Chain:
+    """Return the chain that begins with one step of the first stage, which is judged beside what comes after it."""
+    here = problem.under(step.model)
+    model = _refitted(here, step.model)
+    return _forward(here, _Chain((step,), model, (tuple(first),)), candidate_steps(here, model, first))
 
 
 def _effects(steps: Sequence[Step]) -> set[str]:
