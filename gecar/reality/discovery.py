@@ -447,7 +447,7 @@ def _is_left(stage: _Stage) -> bool:
     if explained.unexplained or not explained.problem.is_beyond_constants:
         return explained.unexplained
     share = _left(stage) / max(left_before(explained.problem), 1.0)
-    return _left(stage) >= FOR_A_LAW and share > left_share(explained.taken.effects)
+    return _left(stage) >= FOR_A_LAW and share > left_share(explained.taken)
 
 
 def _is_material(stage: _Stage, before: _Stage) -> bool:

@@ -16,10 +16,12 @@ from gecar.errors import InputError
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.discrepancy import discrepancy
 from gecar.reality.fitting.initial_values import patches
+from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import free
 from gecar.reality.materiality import Material, Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.optimisation.least_squares import Minimum, cost
 from gecar.reality.recordings.recording import Case, Recording, write_recording
 from gecar.reality.residuals import parting
 from gecar.reality.residuals.of_case import motion_residuals
@@ -191,9 +193,21 @@ def test_what_one_of_two_recordings_shows_at_a_spot_is_that_recordings(
     assert sizes.left_about(EV3.physics, (0.6, 0.6)) == Size(mm_1m=1.0)
 
 
+def with_sizes(**sizes: float) -> Model:
+    """Return a model of effects that are so many times as large as is worth a name."""
+    z = np.array(list(sizes.values()))
+    return Model(tuple(sizes), free(EV3, tuple(sizes)), Minimum(z, np.zeros(1), 0.0), 0.0)
+
+
 def test_laws_may_leave_what_they_are_off_by() -> None:
-    assert left_share(()) < left_share(("pose_delay",)) < left_share(("backlash",))
-    assert left_share(("pose_delay", "backlash")) == left_share(("backlash",)) > 0.12
+    late, loose = (left_share(with_sizes(**{name: 5.0})) for name in ("pose_delay", "backlash"))
+    assert left_share(with_sizes()) < late < loose
+    assert left_share(with_sizes(pose_delay=5.0, backlash=5.0)) == loose > 0.12
+
+
+def test_laws_may_leave_more_of_what_is_small() -> None:
+    assert left_share(with_sizes(tyre_friction=-1.5)) > left_share(with_sizes(tyre_friction=-4.0)) + 0.05
+    assert left_share(with_sizes(tyre_friction=-0.1)) == left_share(with_sizes(tyre_friction=-1.0))
 
 
 def test_small_changes_each_have_their_own_size() -> None:
