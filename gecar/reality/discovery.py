@@ -42,7 +42,6 @@ from gecar.reality.prove.holdout import Contender, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out, with_enough
-from gecar.reality.replay.channels import POSE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.compilation import compiled_replays
 from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
@@ -487,10 +486,7 @@ def _with_nuisances(held: Residuals, motion: Explanation, physics: npt.NDArray[A
 
 def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray[Any]) -> Residuals:
     """Return recordings with the path their colour sensor took, as a robot's physics gives it."""
-    problem = motion.problem
-    errors = problem.residuals.errors(problem.with_small_changes(motion.taken))
-    inflation = problem.estimator.blocks.inflation(errors)[list(POSE)]
-    return residuals.localised(physics).with_paths(physics, inflation)
+    return residuals.localised(physics).with_paths(physics, motion.problem.slow_noise(motion.taken))
 
 
 def _with_intervals(context: _Context, confirmation: Confirmation, held: Residuals) -> _Stage:

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from support.concealing import recorded
 from support.linear_case import EV3, bumps, linear, linear_problem
 
@@ -112,6 +113,30 @@ def test_sizes_are_millimetres_and_degrees_that_anybody_can_check() -> None:
     # Half a track of 60 mm: a metre of spinning on the spot is 16.7 rad, of which 3 % are 28.6 degrees.
     assert 3.0 < apart.deg_1m < 28.7
     assert 3.0 < sizes.left(narrow).deg_1m <= 1.1 * apart.deg_1m
+
+
+def wandering(run: Recording, seed: int) -> Recording:
+    """Return a recording whose camera is off by 1.5 mm and 0.45 degrees more, by errors that last for 0.3 s."""
+    rng, keep = np.random.default_rng(seed), np.exp(-0.01 / 0.3)
+    noise = rng.normal(size=(3, len(run.t_s) + 500))
+    slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], noise)[:, 500:]
+    x, y, heading = slow * np.array([[0.0015], [0.0015], [np.radians(0.45)]])
+    return replace(run, x_m=run.x_m + x, y_m=run.y_m + y, heading_rad=run.heading_rad + heading)
+
+
+def test_slow_errors_of_a_camera_are_not_left_by_the_robot() -> None:
+    runs = [recorded(EV3, seed) for seed in range(3)]
+    quiet, slow = (
+        problem_of(motion_residuals(each, estimate_noise(each, EV3.physics, 1.0), 1.0, Threads(1)), EV3, ())
+        for each in (runs, [wandering(run, seed) for seed, run in enumerate(runs)])
+    )
+    assert quiet.slow_noise(quiet.known).max() < 1.5
+    inflation = slow.slow_noise(slow.known)
+    assert inflation.min() > 3.0
+    as_white, left = slow.sizes.left(EV3.physics), slow.sizes.left(EV3.physics, inflation=inflation)
+    assert as_white.mm_1m > 1.8
+    assert left.mm_1m < 0.8
+    assert left.deg_1m < 0.7 * as_white.deg_1m
 
 
 def test_worth_a_name_is_what_moves_the_robot_by_a_material_amount() -> None:

@@ -111,7 +111,7 @@ class LinearSizes:
     def are_apart(self, one: np.ndarray, other: np.ndarray, material: Material) -> bool:
         return material.times(self.apart(one, other)) >= 1.0
 
-    def left(self, physics: np.ndarray, repeatedly: bool = False) -> Size:
+    def left(self, physics: np.ndarray, repeatedly: bool = False, inflation: object = None) -> Size:
         beyond = np.mean(self.residuals.errors(physics) ** 2) - 1.0
         return Size(mm_1m=10.0 * float(np.sqrt(max(beyond, 0.0))))
 

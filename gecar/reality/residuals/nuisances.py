@@ -38,6 +38,8 @@ class SensorPath:
         What one standard deviation of the path's x, y and heading changes in each reading, shape (rows, 3) [%].
     block
         How many rows a path's error lasts.
+    inflation
+        By how much slow noise of x, y and heading exceeds white noise (variances), shape (3,).
     """
 
     poses: Array
@@ -47,6 +49,7 @@ class SensorPath:
     own_sd: Array = field(default_factory=lambda: np.zeros(0))
     slopes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     block: int = 1
+    inflation: Array = field(default_factory=lambda: np.ones(3))
 
     @cached_property
     def reading_sd(self) -> Array:

@@ -118,15 +118,22 @@ class RecordingResiduals:
         else:
             least = self.noise.path_sd
             sd = least * np.sqrt(inflation)
-            smeared = least * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
+            smeared = self.smoothed_sd(inflation)
         ahead = float(physics["sensor_ahead"][0])
         blur, least_blur = (
             float(np.hypot(each[0], ahead * each[2])) / PATH_CAUTION for each in (smeared, least)
         )
         block = max(round(PATH_LASTS_S / float(np.median(np.diff(self.replayer.t)))), 1)
-        path = SensorPath(poses, late, blur, least_blur, block=block)
+        path = SensorPath(poses, late, blur, least_blur, block=block, inflation=inflation)
         found = self.with_nuisances(replace(self.nuisances, path=path))
         return found.with_uncertain_path(physics, sd, QUICK)
+
+    def smoothed_sd(self, inflation: Array) -> Array:
+        """Return the standard deviations of the smoothed path, its slow noise included [m, m, rad], shape (3,).
+
+        ``inflation`` is as in `with_path`.
+        """
+        return self.noise.path_sd * np.sqrt(1.0 + SMOOTHED_BLOCKS * (inflation - 1.0))
 
     def with_uncertain_path(self, physics: Physics, sd: Array, quick: float) -> RecordingResiduals:
         """Return this with readings as uncertain as its path makes them, under a model of shape (1,).

@@ -50,6 +50,7 @@ class _Drive(NamedTuple):
 
 
 QUIET = _Noise(0.0, 0.0)
+WHITE = np.ones(3)
 PATH_KNOWN = np.array(
     [0.003, 0.003, 0.01]
 )  # to which a camera, its lens and its mount tell a path [m, m, rad]
@@ -109,14 +110,16 @@ class Sizes:
         """Return what a robot did under a recording's commands: what its sensor read, or how it drove."""
         return run.readings(physics) if self.sensor else _driven(run, physics)
 
-    def left(self, physics: Physics, repeatedly: bool = False) -> Size:
+    def left(self, physics: Physics, repeatedly: bool = False, inflation: Array = WHITE) -> Size:
         """Return how far a robot parts from what was measured, beyond the sensors' noise, in a typical recording.
 
         Or as far as it repeatedly does: in one of four, and in more than one if there are more. Where a motor hardly
-        overcomes friction, nothing is known well: one such recording shall not decide.
+        overcomes friction, nothing is known well: one such recording shall not decide. ``inflation`` is by how much the
+        camera's slow noise exceeds white noise (variances), shape (3,).
         """
         sizes = [
-            _reading_left(run, physics, self.off) if self.sensor else _left(run, physics) for run in self.runs
+            _reading_left(run, physics, self.off) if self.sensor else _left(run, physics, inflation)
+            for run in self.runs
         ]
         return combined(sizes, _repeated if repeatedly else _typical)
 
@@ -153,13 +156,13 @@ def _driven(run: RecordingResiduals, physics: Physics) -> _Drive:
     return _Drive(path, wheels, float(physics["track_width"][0]))
 
 
-def _left(run: RecordingResiduals, physics: Physics) -> Size:
+def _left(run: RecordingResiduals, physics: Physics, inflation: Array) -> Size:
     out, track = Size(), float(physics["track_width"][0])
     rows = _replayed(run, physics).rows
     path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
     if run.replayer.has_poses:
         seen = measured_path(run.replayer, physics)
-        out = out.or_more(_parting(path, seen, wheels, track, _path_noise(run)))
+        out = out.or_more(_parting(path, seen, wheels, track, _path_noise(run, inflation)))
     measured = ~np.isnan(run.replayer.measured[:, :2]).all(axis=0)
     if run.recording.setup.rig == "bench":
         for side in np.flatnonzero(measured):
@@ -181,12 +184,12 @@ def _left_about(run: RecordingResiduals, physics: Physics, spot: tuple[float, fl
     inside = passed[last] > passed[first]
     if not inside.any():
         return None
-    return Size(*_beyond(rows[:, PLACE], seen, first[inside], last[inside], _path_noise(run)))
+    return Size(*_beyond(rows[:, PLACE], seen, first[inside], last[inside], _path_noise(run, WHITE)))
 
 
-def _path_noise(run: RecordingResiduals) -> _Noise:
-    place, _, heading = run.noise.path_sd / PATH_CAUTION
-    return _Noise(float(place), float(heading))
+def _path_noise(run: RecordingResiduals, inflation: Array) -> _Noise:
+    x, y, heading = run.smoothed_sd(inflation) / PATH_CAUTION
+    return _Noise(math.hypot(x, y) / math.sqrt(2.0), float(heading))
 
 
 def _readings_apart(one: Array, other: Array) -> Size:

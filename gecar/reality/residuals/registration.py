@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.noise.sensor_noise import PATH_CAUTION
 from gecar.reality.residuals.nuisances import in_blocks
 from gecar.reality.residuals.of_recording import RecordingResiduals
 
@@ -74,11 +75,12 @@ def _fit(run: RecordingResiduals, physics: Physics, shifts: Array, path_sd: Arra
     path = run.nuisances.path
     assert path is not None
     moved = run.with_nuisances(replace(run.nuisances, path=replace(path, poses=path.poses + shifts)))
-    moved = moved.with_uncertain_path(physics, run.noise.path_sd, ROUGH)
+    quick_sd = np.maximum(run.noise.path_sd, run.smoothed_sd(path.inflation) / PATH_CAUTION)
+    moved = moved.with_uncertain_path(physics, quick_sd, ROUGH)
     there = moved.nuisances.path
     assert there is not None
     errors = run.recording.reflection_pct - moved.readings(physics)
-    longer = there.slopes * (path_sd / run.noise.path_sd)
+    longer = there.slopes * (path_sd / quick_sd)
     whitened = there.whitened(np.vstack([errors, longer.T]))
     own_sd = np.where(np.isnan(whitened[0]), np.nan, there.own_sd)
     spans = in_blocks(np.column_stack([np.nan_to_num(whitened.T), own_sd]), SPAN * path.block)

@@ -19,7 +19,7 @@ from gecar.reality.fitting.parameters import Parameters, free
 from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.optimisation.least_squares import cost_of_each, least_squares
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.replay.channels import BATTERY
+from gecar.reality.replay.channels import BATTERY, POSE
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.residuals.parting import Sizes
 from gecar.reality.selection.thresholds import CLOCKS_SCATTER_S, LARGE, PRICE, SMALL, STANDING_OUT, UNNAMED
@@ -197,6 +197,14 @@ class Problem:
         values = self.small_changes(model, beside)
         parameters = free(self.estimator.robot, list(values))
         return parameters.physics(parameters.vector(values))
+
+    def slow_noise(self, model: Model) -> Array:
+        """Return by how much slow noise of x, y and heading exceeds white noise (variances), shape (3,).
+
+        It is told by what a model leaves with the most likely small changes of all other parameters.
+        """
+        errors = self.residuals.errors(self.with_small_changes(model))
+        return self.estimator.blocks.inflation(errors)[list(POSE)]
 
     def with_changes_for(self, model: Model, errors: Array) -> Physics:
         """Return a model's physics record with the small changes that explain given residuals best, shape (1,).

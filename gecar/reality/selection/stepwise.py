@@ -213,9 +213,10 @@ def left_by(problem: Problem, model: Model) -> Size:
 
     They explain windows of a second, and may take whole drives farther from what was measured.
     """
-    robots = (model.physics, problem.with_small_changes(model))
+    robots, inflation = (model.physics, problem.with_small_changes(model)), problem.slow_noise(model)
     return min(
-        (problem.sizes.left(physics, repeatedly=True) for physics in robots), key=problem.material.times
+        (problem.sizes.left(physics, repeatedly=True, inflation=inflation) for physics in robots),
+        key=problem.material.times,
     )
 
 
