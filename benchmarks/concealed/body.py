@@ -73,7 +73,7 @@ def _chassis(concealed: Concealed) -> str:
     ahead = base.mass * concealed.com_ahead / mass
     up = (base.mass * concealed.com_height - 2.0 * WHEEL_MASS * height) / mass - height
     wheels = 2.0 * WHEEL_MASS * (concealed.com_ahead**2 + half_track**2 + 0.3 * height**2)
-    yaw = base.yaw_inertia - wheels - mass * (ahead - concealed.com_ahead) ** 2
+    yaw = base.yaw_inertia * (1.0 + concealed.outrigger) - wheels - mass * (ahead - concealed.com_ahead) ** 2
     # No body turns harder about one axis than about the other two together.
     roll = max(CHASSIS_ROLL_INERTIA, yaw - CHASSIS_PITCH_INERTIA)
     inertia = f"{roll!r} {CHASSIS_PITCH_INERTIA} {yaw!r}"
@@ -93,19 +93,19 @@ def _unevenness(concealed: Concealed) -> float:
 
 
 def _wheel(concealed: Concealed, side: str, y: float, radius: float) -> str:
-    """One motor shaft with its wheel; play makes the wheel a body of its own, loose on the shaft."""
+    """One motor shaft with its wheel; play or a clutch makes the wheel a body of its own, loose on the shaft."""
     spin = 0.5 * WHEEL_MASS * radius**2
     wheel = (
         f'<inertial pos="0 0 0" mass="{WHEEL_MASS}" diaginertia="{0.6 * spin!r} {spin!r} {0.6 * spin!r}"/>'
         f'<geom name="{side}" {_tread(concealed, side, radius)} {_GHOST}/>'
     )
+    if concealed.clutch is not None and concealed.clutch[1] == ("left", "right").index(side):
+        slips = f'frictionloss="{concealed.clutch[0]!r}" {_HARD.format("friction")}'
+        wheel = _loose(f"{side}_clutch", slips, wheel)
     if concealed.backlash_deg > 0.0:
         play = concealed.backlash_deg / 2.0
-        wheel = (
-            '<inertial pos="0 0 0" mass="1e-4" diaginertia="1e-8 1e-8 1e-8"/>'
-            f'<body name="{side}_wheel"><joint name="{side}_play" type="hinge" axis="0 1 0" limited="true" '
-            f'range="{-play!r} {play!r}" {_HARD.format("limit")}/>{wheel}</body>'
-        )
+        within = f'limited="true" range="{-play!r} {play!r}" {_HARD.format("limit")}'
+        wheel = _loose(f"{side}_play", within, wheel)
     base = concealed.base
     braking = base.torque_constant * base.back_emf_constant / base.resistance
     damping = braking + concealed.viscous_friction
@@ -114,6 +114,14 @@ def _wheel(concealed: Concealed, side: str, y: float, radius: float) -> str:
         f'<joint name="{side}" type="hinge" axis="0 1 0" '
         f'armature="{base.shaft_inertia * concealed.inertia_scale!r}" damping="{damping!r}" '
         f'frictionloss="{max(concealed.coulomb_friction, 1e-9)!r}" {_HARD.format("friction")}/>{wheel}</body>'
+    )
+
+
+def _loose(name: str, held: str, wheel: str) -> str:
+    """Make what sits on a shaft a body of its own, which a joint holds."""
+    return (
+        '<inertial pos="0 0 0" mass="1e-4" diaginertia="1e-8 1e-8 1e-8"/>'
+        f'<body name="{name}_wheel"><joint name="{name}" type="hinge" axis="0 1 0" {held}/>{wheel}</body>'
     )
 
 

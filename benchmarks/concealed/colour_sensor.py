@@ -96,6 +96,8 @@ class ColourSensor:
             0.0,
         ]  # the loose mount: ahead, left [m] and their rates, in the robot's frame
         self._moving = (0.0, 0.0)  # velocity of the mount in the course's frame [m/s]
+        self._axle = (math.nan, math.nan)  # where its centre was a tick ago [m]
+        self._pace = 0.0  # speed to which the robot's pitch has settled [m/s]
 
     def look(self, x: float, y: float, heading: float) -> float:
         """Read the floor.
@@ -126,6 +128,8 @@ class ColourSensor:
             light *= 1.0 - lost * (1.0 - math.exp(-self._ticks * TICK_S / time))
         if self._hidden.auto_gain is not None:
             light *= self._gain(light)
+        if self._hidden.nod is not None:
+            light *= self._nodded(x, y, heading)
         self._ticks += 1
         return self._hidden.sensor_gain * light + self._hidden.sensor_offset_pct
 
@@ -134,6 +138,17 @@ class ColourSensor:
         power, time = self._hidden.auto_gain or (0.0, 1.0)
         self._mean = light if math.isnan(self._mean) else self._mean + TICK_S / time * (light - self._mean)
         return float((max(self._mean, _DIMMEST) / 100.0) ** -power)
+
+    def _nodded(self, x: float, y: float, heading: float) -> float:
+        """Give the share of light that comes back while acceleration lifts, or braking lowers, the robot's nose."""
+        lost, time = self._hidden.nod or (0.0, 1.0)
+        (old_x, old_y), self._axle = self._axle, (x, y)
+        if math.isnan(old_x):
+            return 1.0
+        speed = (math.cos(heading) * (x - old_x) + math.sin(heading) * (y - old_y)) / TICK_S
+        pitched = (speed - self._pace) / time
+        self._pace += TICK_S * pitched
+        return max(1.0 - lost * pitched, 0.0)
 
     def _floor(self, x: float, y: float, heading: float) -> float:
         hidden = self._hidden
@@ -160,6 +175,8 @@ class ColourSensor:
             loss, source = hidden.ambient
             light *= 1.0 - loss * (1.0 - math.cos(heading - source)) / 2.0
         light *= 1.0 - shade
+        if hidden.seams is not None:
+            light *= self._between(spot_x) * self._between(spot_y)
         if hidden.gamma != 1.0:
             light = 100.0 * max(light / 100.0, 0.0) ** hidden.gamma
         if hidden.gloss is not None:
@@ -172,11 +189,22 @@ class ColourSensor:
     def _printed(self, x: float, y: float) -> tuple[float, float]:
         """Give a place on the floor in the frame of the course as it is printed there."""
         dx, dy, angle = self._hidden.line_shift
-        if (dx, dy, angle) == (0.0, 0.0, 0.0):
-            return x, y
-        cos, sin = math.cos(angle), math.sin(angle)
-        x, y = x - dx, y - dy
-        return cos * x + sin * y, cos * y - sin * x
+        if (dx, dy, angle) != (0.0, 0.0, 0.0):
+            cos, sin = math.cos(angle), math.sin(angle)
+            x, y = x - dx, y - dy
+            x, y = cos * x + sin * y, cos * y - sin * x
+        if self._hidden.wobble is not None:
+            size, length, phase_x, phase_y = self._hidden.wobble
+            turn = 2.0 * math.pi / length
+            x, y = x + size * math.sin(turn * y + phase_x), y + size * math.sin(turn * x + phase_y)
+        return x, y
+
+    def _between(self, along: float) -> float:
+        """Give the share of light that seams between tiles, at every whole tile along one axis, leave the spot."""
+        lost, half = self._hidden.seams or (0.0, 0.0)
+        off, radius = abs(math.remainder(along, TILE)), self._hidden.spot_diameter / 2.0
+        covered = min(off + radius, half) - max(off - radius, -half)
+        return 1.0 - lost * max(covered, 0.0) / (2.0 * radius)
 
     def _ink(self, x: float, y: float) -> float:
         """Give the share of the line's ink that is left at a place where the print is worn."""

@@ -58,6 +58,8 @@ class DriveTrain:
             (0.0, 0.0)
         ] * 2  # duty [%] of each motor, and since when [s]
         self._warm = [0.0, 0.0]  # of each motor's fuse, 1 where its rated current brings it
+        self._borne = [0.0, 0.0]  # for how long each driver has borne too much current [s]
+        self._off_until = [0.0, 0.0]  # s
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
         """Pass one tick's command through delay, ramp, cap and dead band.
@@ -155,10 +157,16 @@ class DriveTrain:
             duties = self._keep(0, duties[0], speeds[0]), self._keep(1, duties[1], speeds[1])
         if self._hidden.holding > 0.0:
             duties = self._hold(0, duties[0], angles[0]), self._hold(1, duties[1], angles[1])
+        if self._hidden.cut_out is not None:
+            off = [time_s < until for until in self._off_until]
+            duties = 0.0 if off[0] else duties[0], 0.0 if off[1] else duties[1]
         terminal = self._terminal(duties, speeds, time_s)
+        volts = [duty * terminal for duty in duties]
+        if self._hidden.cut_out is not None:
+            volts = [self._guarded(i, volts[i], speeds[i], time_s) for i in (0, 1)]
         torques = tuple(
-            self._torque(i, duties[i] * terminal, speeds[i], angles[i])
-            + self._oddities(i, duties[i] * terminal, speeds[i], angles[i], time_s)
+            self._torque(i, volts[i], speeds[i], angles[i])
+            + self._oddities(i, volts[i], speeds[i], angles[i], time_s)
             for i in (0, 1)
         )
         if self._hidden.axle_rub > 0.0:
@@ -172,6 +180,7 @@ class DriveTrain:
         if self._hidden.duty_step_pct > 0.0:
             duty_pct = self._hidden.duty_step_pct * round(duty_pct / self._hidden.duty_step_pct)
         duty = min(max(duty_pct / 100.0, -DUTY_CAP), DUTY_CAP)
+        duty *= 1.0 + self._hidden.expo * ((duty / DUTY_CAP) ** 2 - 1.0)
         band = self._hidden.dead_band_pct / 100.0
         if band == 0.0:
             return duty
@@ -202,6 +211,9 @@ class DriveTrain:
             source = self._sag(source, duties, speeds)
         if self._hidden.loose_cell is not None:
             source *= self._touching(speeds)
+        if self._hidden.pulses is not None:
+            share, period, on, gone = self._hidden.pulses
+            source *= 1.0 - share * ((time_s / period + gone) % 1.0 < on)
         inner = self._hidden.battery_resistance
         if inner == 0.0:
             return source
@@ -212,6 +224,18 @@ class DriveTrain:
             / self._base.resistance
         )
         return (source + inner * back) / (1.0 + inner * load)
+
+    def _guarded(self, side: int, volts: float, speed: float, time_s: float) -> float:
+        """Let a driver cut out for a while when it has borne too much current; a motor that is off runs free [V]."""
+        most, bears, rests = self._hidden.cut_out or (math.inf, 0.0, 0.0)
+        back = self._base.back_emf_constant * speed
+        if time_s < self._off_until[side]:
+            return back
+        too_much = abs(volts - back) > most * self._base.resistance
+        self._borne[side] = self._borne[side] + TICK_S if too_much else 0.0
+        if self._borne[side] > bears:
+            self._borne[side], self._off_until[side] = 0.0, time_s + rests
+        return volts
 
     def _touching(self, speeds: tuple[float, float]) -> float:
         """Give the share of the voltage that is left while a curve pulls a cell off its spring."""

@@ -293,6 +293,8 @@ def seen_pose(
     away = pose[:2] - np.array(FIELD)[:, None] / 2.0
     if concealed.keystone != (0.0, 0.0):
         away, pose[2] = _askew(away, pose[2], np.array(concealed.keystone))
+    if concealed.aspect != 0.0:
+        away, pose[2] = _stretched(away, pose[2], concealed.aspect)
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))
     turn = math.radians(concealed.pose_drift_deg) * times + math.radians(concealed.camera_turn_deg)
     if concealed.camera_bump is not None:
@@ -308,7 +310,18 @@ def seen_pose(
         away, turn = away + np.stack([shift_x, shift_y]), turn + shaken
     x = FIELD[0] / 2.0 + np.cos(turn) * away[0] - np.sin(turn) * away[1]
     y = FIELD[1] / 2.0 + np.sin(turn) * away[0] + np.cos(turn) * away[1]
+    if concealed.compass is not None:
+        size, periods, phase = concealed.compass
+        turn = turn + size * np.sin(periods * pose[2] + phase)
     return x, y, pose[2] + turn
+
+
+def _stretched(away: Array, heading: Array, share: float) -> tuple[Array, Array]:
+    """See places (2, rows) and headings by an image that is too wide and too low by a share."""
+    wide, high = 1.0 + share, 1.0 - share
+    cos, sin = np.cos(heading), np.sin(heading)
+    across, along = (high - wide) * cos * sin, wide * cos**2 + high * sin**2
+    return away * np.array([[wide], [high]]), heading + np.arctan2(across, along)
 
 
 def _askew(away: Array, heading: Array, scale_falls: Array) -> tuple[Array, Array]:

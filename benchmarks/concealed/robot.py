@@ -203,6 +203,30 @@ class Concealed:
         None  # most that poses lag [s], period [s], share of one gone
     )
 
+    # Outside the catalogue, from the sixth set of kinds.
+    expo: float = 0.0  # share of a duty that grows with its cube; the greatest duty stays as it is
+    # Current that a motor's driver cuts off [A], for how long it bears that, and for how long it is off [s].
+    cut_out: tuple[float, float, float] | None = None
+    clutch: tuple[float, int] | None = None  # torque from which a wheel slips on its axle [N m], side
+    # Share of the battery's voltage that another load takes, its period [s], share of it that is on, and of one gone.
+    pulses: tuple[float, float, float, float] | None = None
+    fin: tuple[float, float] | None = (
+        None  # greatest torque of a draught [N m], heading it turns the robot to [rad]
+    )
+    outrigger: float = 0.0  # share by which the yaw inertia is greater
+    nap: tuple[float, float] | None = None  # share of its way that a robot is carried aside, which way [rad]
+    wobble: tuple[float, float, float, float] | None = (
+        None  # of the line: size, wave length [m], phases x, y [rad]
+    )
+    seams: tuple[float, float] | None = None  # share of light lost where tiles meet, half width [m]
+    nod: tuple[float, float] | None = (
+        None  # share of light lost per acceleration ahead [s^2/m], settling time [s]
+    )
+    aspect: float = 0.0  # the camera's x is too long by this share, its y too short
+    compass: tuple[float, int, float] | None = (
+        None  # deviation of the heading [rad], periods a turn, phase [rad]
+    )
+
     # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
     inductance_scale: float = 1.0
     presliding_scale: float = 1.0  # of the gear's deflection before it slides

@@ -44,7 +44,7 @@ class Surroundings:
         self._scratch = np.zeros(6)
         drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
         hauled = concealed.trailer or concealed.twist
-        dragged = concealed.hair or concealed.grooves or concealed.fan or concealed.scrub
+        dragged = concealed.hair or concealed.grooves or concealed.fan or concealed.scrub or concealed.fin
         self._pushed = bool(
             concealed.tether or concealed.magnet or concealed.gusts or drags or hauled or dragged
         )
@@ -53,7 +53,12 @@ class Surroundings:
         )
         self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
         self.idle = not (
-            self._pushed or self._gripped or concealed.waves or concealed.rocking or self._braked
+            self._pushed
+            or self._gripped
+            or concealed.waves
+            or concealed.rocking
+            or self._braked
+            or concealed.nap
         )
         self._rolled, self._castor = 0.0, math.nan  # way of the wheels [m], heading of a castor wheel [rad]
         self._turned = 0.0  # since the recording began [rad]
@@ -63,6 +68,8 @@ class Surroundings:
         shafts = [model.joint(side) for side in ("left", "right")]
         self._angle_at = [int(shaft.qposadr[0]) for shaft in shafts]
         self._speed_at = [int(shaft.dofadr[0]) for shaft in shafts]
+        ends = [int(model.body_dofadr[body] + model.body_dofnum[body]) for body in self._wheels]
+        self._spins = list(map(slice, self._speed_at, ends))  # a wheel may turn on its shaft, too
 
     def settle(self) -> None:
         """Set what does not change while driving, and undo what the last drive left behind."""
@@ -92,6 +99,12 @@ class Surroundings:
             slope, _, way, _ = self._hidden.rocking
             (tilt_x, tilt_y), leaning = self._hidden.tilt, slope * self._tip(x, y)
             self._lean(tilt_x + leaning * math.cos(way), tilt_y + leaning * math.sin(way))
+        if self._hidden.nap is not None:
+            share, way = self._hidden.nap
+            heading = _heading(state)
+            ahead = math.cos(heading) * state.qvel[0] + math.sin(heading) * state.qvel[1]
+            carried = TICK_S * share * abs(ahead)
+            state.qpos[:2] += carried * math.cos(way), carried * math.sin(way)
         if self._pushed:
             heading = _heading(state)
             force_x, force_y = self._push(x, y, state.qvel, time_s)
@@ -155,6 +168,8 @@ class Surroundings:
             self._turned += TICK_S * rate
         if hidden.scrub > 0.0:
             turning -= hidden.scrub * math.tanh(rate / _SCRUB_BLEND)
+        if hidden.fin is not None:
+            turning -= hidden.fin[0] * math.sin(heading - hidden.fin[1])
         if hidden.pile is not None:
             most, way = hidden.pile
             ahead = math.cos(heading) * velocity[0] + math.sin(heading) * velocity[1]
@@ -254,7 +269,7 @@ class Surroundings:
         loads = self._loads(state)
         sticking, rubbing, clinging = self._sticking(state), self._rubbing(state), self._clinging(state)
         axle = state.xmat[self._chassis].reshape(3, 3)[:, 1]
-        turning = state.qvel[[6, -1]] if state.qvel.size == 8 else state.qvel[[6, 8]] + state.qvel[[7, 9]]
+        turning = [float(state.qvel[spin].sum()) for spin in self._spins]
         for side, body in enumerate(self._wheels):
             brake = self._hidden.rolling_resistance * loads[side] * self._radii[side] + sticking[side]
             brake += rubbing[side]

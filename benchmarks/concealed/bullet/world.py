@@ -109,7 +109,7 @@ class _Robot:
         self._lean(*concealed.tilt)
         still = (concealed.air_drag, concealed.yaw_pull) == (0.0, 0.0)
         pulls = (concealed.tether, concealed.magnet, concealed.pile, concealed.swivel, concealed.trailer)
-        pulls += (concealed.hair, concealed.grooves, concealed.fan)
+        pulls += (concealed.hair, concealed.grooves, concealed.fan, concealed.fin)
         self._pushed = (
             not still
             or concealed.twist > 0.0

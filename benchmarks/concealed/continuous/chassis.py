@@ -161,6 +161,10 @@ def _step_body(
         n, b, axle_x, axle_y, b[TURN], axle_vx, axle_vy, b[RATE], gusts, time_s, dt
     )
     force_x, force_y, torque = force_x + push_x, force_y + push_y, torque + push_turn
+    if n.nap > 0.0:
+        carried_x, carried_y = turned(dt * n.nap * abs(ahead), 0.0, n.nap_way)
+        b[X] += carried_x
+        b[Y] += carried_y
 
     _move(n, b, force_x, force_y, torque, dt)
 
@@ -486,6 +490,7 @@ def pushes(
     b[TURNED] += dt * rate
     if n.scrub > 0.0:
         torque -= n.scrub * math.tanh(rate / _SCRUB_BLEND)
+    torque -= n.fin * math.sin(turn - n.fin_way)
     if n.fan > 0.0:
         blow_x, blow_y = _blow(n, x, y, time_s)
         force_x, force_y = force_x + blow_x, force_y + blow_y

@@ -13,9 +13,11 @@ from benchmarks.concealed.continuous.numbers import Numbers
 # State: currents [A], shaft speeds [rad/s], shaft angles [rad], bristle deflections [rad], left and right; then the
 # voltage of the battery's slow branch [V], the voltage at its terminals [V] and what the firmware adds to both duties;
 # then angles at which motors were stopped [rad], share of a grease's stiffness that is left, less one, voltage of a
-# worn battery's slow part [V], and how warm the motors' fuses are, against what their rated current makes of them.
+# worn battery's slow part [V], and how warm the motors' fuses are, against what their rated current makes of them;
+# then for how long drivers have borne too much current, and until when they are off [s], and how far wheels slipped
+# on their axles [rad].
 CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT = 0, 2, 4, 6, 8, 9, 10
-HELD, GREASE, SAGGED, WARM, SIZE = 12, 14, 15, 16, 18
+HELD, GREASE, SAGGED, WARM, BORNE, OFF, SLIPPED, SIZE = 12, 14, 15, 16, 18, 20, 22, 24
 
 # Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
 GEAR_STIFFNESS = 40.0  # N m / rad
@@ -76,6 +78,8 @@ def step_drive(
         d[SAGGED] += dt / n.sag_time * (n.sag * drawn - d[SAGGED])
     if n.loose > 0.0:
         source -= source * _lost(n, d)
+    if n.pulses > 0.0 and (time_s / n.pulses_period + n.pulses_gone) % 1.0 < n.pulses_on:
+        source -= n.pulses * source
     terminal = source - (1.0 - _SLOW_SHARE) * n.inner_resistance * drawn - d[SLOW]
     d[SLOW] += dt / _SLOW_TIME * (_SLOW_SHARE * n.inner_resistance * drawn - d[SLOW])
     d[TERMINAL] = terminal
@@ -91,7 +95,13 @@ def step_drive(
         if n.hum > 0.0 and n.hum_side == side:
             torque -= _hum(n, speed)
         play = n.play + (n.loosening_left if side == 0 else n.loosening_right) * time_s
-        gear = _gear(play / 2.0, angle - wheel_angles[side], speed - wheel_speeds[side])
+        twist = angle - wheel_angles[side] - d[SLIPPED + side]
+        gear = _gear(play / 2.0, twist, speed - wheel_speeds[side])
+        most = n.clutch_left if side == 0 else n.clutch_right
+        if abs(gear) > most:
+            held = min(max(gear, -most), most)
+            d[SLIPPED + side] += (gear - held) / GEAR_STIFFNESS
+            gear = held
         d[SPEED + side] += dt * (torque - gear) / n.shaft_inertia
         d[ANGLE + side] += dt * d[SPEED + side]
         torques[side] = gear
@@ -199,6 +209,8 @@ def _motor(
     follow = dt / n.inductance
     current = (d[CURRENT + side] + follow * (volts - n.back_emf * speed)) / (1.0 + follow * resistance)
     current = min(max(current, -n.current_limit), n.current_limit)
+    if n.cut_rests > 0.0:
+        current = _guarded(n, d, side, current, time_s, dt)
     d[CURRENT + side] = current
     if duty == 0.0:
         current *= 1.0 - n.coasting
@@ -206,6 +218,19 @@ def _motor(
     if n.gear_loss > 0.0 and n.gear_loss_side == side:
         torque -= n.gear_loss * abs(torque) * math.tanh(speed / _DRAG_BLEND)
     return torque
+
+
+@numba.njit(cache=True)
+def _guarded(
+    n: Numbers, d: npt.NDArray[np.float64], side: int, current: float, time_s: float, dt: float
+) -> float:
+    """Let a driver that has borne too much current for too long be off for a while; give the current that flows [A]."""
+    if time_s < d[OFF + side]:
+        return 0.0
+    d[BORNE + side] = d[BORNE + side] + dt if abs(current) > n.cut_current else 0.0
+    if d[BORNE + side] > n.cut_bears:
+        d[BORNE + side], d[OFF + side] = 0.0, time_s + n.cut_rests
+    return current
 
 
 @numba.njit(cache=True)

@@ -11,7 +11,7 @@ from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 
 
 class Firmware:
-    """Throttle, delay, ramp, pause, rounding, cap, dead band and what wanders, in this order, once a tick.
+    """Throttle, delay, ramp, pause, rounding, cap, bend, dead band and what wanders, in this order, once a tick.
 
     Parameters
     ----------
@@ -115,5 +115,7 @@ class Firmware:
         if hidden.duty_step_pct > 0.0:
             duty_pct = round(duty_pct / hidden.duty_step_pct) * hidden.duty_step_pct
         size, band = min(abs(duty_pct) / 100.0, DUTY_CAP), hidden.dead_band_pct / 100.0
+        if hidden.expo != 0.0:
+            size = (1.0 - hidden.expo) * size + hidden.expo * size**3 / DUTY_CAP**2
         lost = 0.0 if hidden.dead_band_is_threshold else band
         return math.copysign(size - lost, duty_pct) if size > band or band == 0.0 else 0.0

@@ -154,6 +154,19 @@ class Numbers(NamedTuple):
     patches: float
     patches_size: float
     patches_pattern: float
+    cut_current: float
+    cut_bears: float
+    cut_rests: float
+    clutch_left: float
+    clutch_right: float
+    pulses: float
+    pulses_period: float
+    pulses_on: float
+    pulses_gone: float
+    fin: float
+    fin_way: float
+    nap: float
+    nap_way: float
 
 
 def numbers(concealed: Concealed) -> Numbers:
@@ -193,9 +206,14 @@ def numbers(concealed: Concealed) -> Numbers:
     hum, fuse = concealed.hum or (0.0, 0.0, 1.0, 0), concealed.fuse or (0.0, 1.0, 1.0)
     loose, fan = concealed.loose_cell or (0.0, 1.0, 1.0), concealed.fan or (0.0, 0.0, 0.0, 1.0, 0.0)
     rocking, patches = concealed.rocking or (0.0, 0.0, 0.0, 0.0), concealed.patches or (0.0, 1.0, 0.0)
+    clutches = [math.inf, math.inf]
+    if concealed.clutch is not None:
+        clutches[concealed.clutch[1]] = concealed.clutch[0]
+    cut_out, fin = concealed.cut_out or (math.inf, 0.0, 0.0), concealed.fin or (0.0, 0.0)
+    nap, pulses = concealed.nap or (0.0, 0.0), concealed.pulses or (0.0, 1.0, 0.0, 0.0)
     fields = {
         "mass": base.mass,
-        "yaw_inertia": base.yaw_inertia,
+        "yaw_inertia": base.yaw_inertia * (1.0 + concealed.outrigger),
         "com_ahead": concealed.com_ahead,
         "com_height": concealed.com_height,
         "caster": base.caster_ahead,
@@ -330,6 +348,19 @@ def numbers(concealed: Concealed) -> Numbers:
         "patches": patches[0],
         "patches_size": patches[1],
         "patches_pattern": patches[2],
+        "cut_current": cut_out[0],
+        "cut_bears": cut_out[1],
+        "cut_rests": cut_out[2],
+        "clutch_left": clutches[0],
+        "clutch_right": clutches[1],
+        "pulses": pulses[0],
+        "pulses_period": pulses[1],
+        "pulses_on": pulses[2],
+        "pulses_gone": pulses[3],
+        "fin": fin[0],
+        "fin_way": fin[1],
+        "nap": nap[0],
+        "nap_way": nap[1],
     }
     return Numbers(**{name: float(number) for name, number in fields.items()})
 

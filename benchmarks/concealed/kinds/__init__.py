@@ -6,9 +6,10 @@ from benchmarks.concealed.kinds.final import FINAL
 from benchmarks.concealed.kinds.fresh import FRESH
 from benchmarks.concealed.kinds.outside import OUTSIDE, Outside
 from benchmarks.concealed.kinds.sealed import SEALED
+from benchmarks.concealed.kinds.sixth import SIXTH
 from benchmarks.concealed.kinds.unmet import UNMET
 
-ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET, **FRESH}
+ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET, **FRESH, **SIXTH}
 
 MET = "met"
 _KNOWN = {name: kind for name, kind in SEALED.items() if not kind.last}
@@ -19,4 +20,5 @@ SETS: dict[str, dict[str, Outside]] = {
     "final": FINAL,  # and no other: had they joined the rest, no seed would draw what it drew before
     "unmet": UNMET,
     "fresh": FRESH,
+    "sixth": SIXTH,
 }

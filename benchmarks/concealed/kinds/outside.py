@@ -31,7 +31,7 @@ class Outside:
     needs
         Columns without which it leaves no trace.
     last
-        Whether it is kept for a last examination; of ``FINAL``, ``UNMET`` and ``FRESH``, every one.
+        Whether it is kept for a last examination; of ``FINAL`` and every later set, every one.
     """
 
     words: str
