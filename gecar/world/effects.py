@@ -334,8 +334,9 @@ CATALOGUE: tuple[Effect, ...] = (
             _P("sensor_offset", "offset_pct", "%", -40.0, 40.0, 0.0, 1.0)),
            ("sensor",), "level on white and black", _SENSOR),
     Effect("sensor_position", "the sensor is mounted elsewhere",
-           (_P("sensor_ahead", "ahead_m", "m", 0.0, 0.16, None, 0.0015),
-            _P("sensor_left", "left_m", "m", -0.08, 0.08, None, 0.0015)),
+           # a camera, its mark and a course are set up no better
+           (_P("sensor_ahead", "ahead_m", "m", 0.0, 0.16, None, 0.003),
+            _P("sensor_left", "left_m", "m", -0.08, 0.08, None, 0.003)),
            ("sensor",), "edges come early or late", _SENSOR,
            scan="around the mount"),
     Effect("spot_size", "the sensor sees a larger or smaller spot",
