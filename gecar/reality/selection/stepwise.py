@@ -355,17 +355,25 @@ def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
     """Return the chains that begin with a runner-up, where the first took several effects, or with half of a pair.
 
-    Where it took none, what fits best may be stopped by a bound, or make whole drives worse, for it stands in for two.
+    Where it took none, what fits best may be stopped by a bound, or make whole drives worse, for it stands in for two;
+    they then leave no more than is material: what imitates is stopped by bounds, too.
     """
     rivals = [step for step in first[:BEGINNINGS] if step.gain > max(COMPETING * first[0].gain, PRICE)]
     if not chain.steps:
         pairs = (_beginning_with(problem, first, step) for step in rivals)
-        return [pair for pair in pairs if len(pair.steps) > 1]
+        return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
     if len(chain.steps) < 2:
         return []
     runners_up = [step for step in rivals if step is not first[0] and not stopped(step)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
     return [other for other in chains if other is not chain and other.with_camera is None]
+
+
+def _leaves_much(problem: Problem, model: Model) -> bool:
+    """Whether a model leaves more than is material (`is_much`)."""
+    here = problem.under(model)
+    left = here.material.times(left_by(here, model))
+    return is_much(here, left, left_before(problem), left_share(model))
 
 
 def _beginning_with(problem: Problem, first: Sequence[Step], step: Step) -> _Chain:
