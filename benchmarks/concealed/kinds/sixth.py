@@ -1,7 +1,6 @@
 """A sixth set of physics outside the catalogue, for examinations by what nobody has met.
 
-It was written by someone who had not read the tool that is examined, nor what it had been found to miss. Whoever works
-on the tool had better not read it.
+It was written by someone who had not read the tool that is examined, nor what it had been found to miss.
 """
 
 from __future__ import annotations
