@@ -105,7 +105,7 @@ def without_null(problem: Problem, step: Step) -> Step:
     return replace(cross_validation.judged(problem, step), null_95=0.0, p=0.0)
 
 
-def by_sensitivities(problem: Problem, model: Model) -> list[Step]:
+def by_sensitivities(problem: Problem, model: Model, before: Sequence[Step] = ()) -> list[Step]:  # noqa: ARG001
     """Rank every other effect by its sensitivities, and take one step along them: screening, never a fit."""
     others = (e for e in problem.tried if e not in model.effects)
     promises = {e: problem.estimator.linear_gain(model, e) for e in others}
