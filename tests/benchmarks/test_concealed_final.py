@@ -13,11 +13,10 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the last kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE, driven
+from support.concealed_worlds import HERE, driven, label_of
 
-from benchmarks.concealed import cases
 from benchmarks.concealed.__main__ import main
-from benchmarks.concealed.cases import Manner, draw_case, unlike_neutral
+from benchmarks.concealed.cases import Manner, unlike_neutral
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.history import History
 from benchmarks.concealed.kinds import ALL_OUTSIDE, SETS
@@ -28,8 +27,7 @@ from benchmarks.concealed.kinds.sealed import SEALED
 from benchmarks.concealed.kinds.unmet import UNMET
 from benchmarks.concealed.plan import Counts, outside_kinds, plan
 from benchmarks.concealed.recording import channels
-from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
-from benchmarks.concealed.settings import Setting
+from benchmarks.concealed.robot import NEUTRAL, Concealed
 from benchmarks.concealed.worlds import WORLDS, holds
 
 LEFT, RIGHT = 0, 1
@@ -134,11 +132,7 @@ def test_the_command_plans_cases_of_a_set_alone(monkeypatch, tmp_path, kinds):
 
 
 def test_a_label_says_which_kind_and_how_strong(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "SECONDS", 3.0)
-    monkeypatch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
-    manner = Manner("continuous", background=True, material=True)
-    draw_case("c", "outside", ("worn_brushes",), (4,), tmp_path, manner)
-    label = json.loads((tmp_path / "sealed" / "c" / "label.json").read_text())
+    label = label_of("worn_brushes", tmp_path, monkeypatch)
     assert label["outside"]["id"] == "worn_brushes"
     assert set(label["outside"]["numbers"]) == {"share", "side"}
     assert len(label["robot"]["wander"][1]) > 24

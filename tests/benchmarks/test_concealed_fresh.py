@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -12,17 +11,15 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the fresh kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE, assert_felt_alike, changes, driven
+from support.concealed_worlds import HERE, assert_felt_alike, changes, driven, label_of
 
-from benchmarks.concealed import cases
-from benchmarks.concealed.cases import Manner, draw_case
+from benchmarks.concealed.cases import Manner
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.history import History
 from benchmarks.concealed.kinds.fresh import FRESH
 from benchmarks.concealed.plan import outside_kinds
 from benchmarks.concealed.recording import channels
-from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
-from benchmarks.concealed.settings import Setting
+from benchmarks.concealed.robot import NEUTRAL, Concealed
 from benchmarks.concealed.worlds import truth
 
 LEFT = 0
@@ -175,11 +172,7 @@ def test_fresh_kinds_are_drawn_alone_or_not_at_all():
 
 
 def test_a_label_says_which_kind_and_how_strong(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "SECONDS", 3.0)
-    monkeypatch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
-    manner = Manner("continuous", background=True, material=True)
-    draw_case("c", "outside", ("tyre_scrub",), (4,), tmp_path, manner)
-    label = json.loads((tmp_path / "sealed" / "c" / "label.json").read_text())
+    label = label_of("tyre_scrub", tmp_path, monkeypatch)
     assert label["outside"]["id"] == "tyre_scrub"
     assert set(label["outside"]["numbers"]) == {"torque_nm"}
     assert label["size"]["tyre_scrub"]["deg_drive"] > 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 
@@ -13,10 +12,9 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the sixth kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE, assert_felt_alike, changes, driven
+from support.concealed_worlds import HERE, assert_felt_alike, changes, driven, label_of
 
-from benchmarks.concealed import cases
-from benchmarks.concealed.cases import Manner, draw_case, unlike_neutral
+from benchmarks.concealed.cases import Manner, unlike_neutral
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.effects import Exactly
 from benchmarks.concealed.history import History
@@ -25,7 +23,6 @@ from benchmarks.concealed.plan import outside_kinds
 from benchmarks.concealed.recording import channels
 from benchmarks.concealed.rehearsal import along, stacked
 from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
-from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.sizes import is_material, size
 from benchmarks.concealed.worlds import holds, truth
 
@@ -226,11 +223,7 @@ def test_sixth_kinds_are_drawn_alone_or_not_at_all():
 
 
 def test_a_label_says_which_kind_and_how_strong(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "SECONDS", 3.0)
-    monkeypatch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
-    manner = Manner("continuous", background=True, material=True)
-    draw_case("c", "outside", ("slipping_clutch",), (4,), tmp_path, manner)
-    label = json.loads((tmp_path / "sealed" / "c" / "label.json").read_text())
+    label = label_of("slipping_clutch", tmp_path, monkeypatch)
     assert label["outside"]["id"] == "slipping_clutch"
     assert set(label["outside"]["numbers"]) == {"torque_nm", "side"}
     assert label["size"]["slipping_clutch"]["deg_drive"] > 0.0

@@ -1,11 +1,14 @@
 """The worlds of the concealed cases that can be tested here."""
 
 import importlib.util
+import json
 import math
 
 import pytest
 
-from benchmarks.concealed.robot import NEUTRAL, Concealed
+from benchmarks.concealed import cases
+from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
+from benchmarks.concealed.settings import Setting
 from benchmarks.concealed.worlds import WORLDS, truth
 
 HERE = [
@@ -44,3 +47,12 @@ def assert_felt_alike(world, felt, elsewhere):
         assert abs(here[part]) > 1e-3, fields
         assert math.copysign(1.0, here[part]) == wanted, fields
         assert here[part] == pytest.approx(there[part], rel=0.15), fields
+
+
+def label_of(kind, folder, monkeypatch):
+    """Draw a short case of two recordings that conceals one kind outside the catalogue; its sealed label."""
+    monkeypatch.setattr(cases, "SECONDS", 3.0)
+    monkeypatch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
+    manner = cases.Manner("continuous", background=True, material=True)
+    cases.draw_case("c", "outside", (kind,), (4,), folder, manner)
+    return json.loads((folder / "sealed" / "c" / "label.json").read_text())

@@ -92,12 +92,16 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     stage = [step for step in stage if not imitates_dry_friction(problem, step.model)]
     if problem.on_bench:
         stage = [step for step in stage if step.worthwhile]
-    best = max((step.gain for step in stage), default=0.0)
-    enough = [step for step in stage[:RUNNERS_UP] if step.gain >= max(PRICE, COMPETING * best)]
-    enough = [step for step in enough if not imitates_a_step(problem, step)]
+    enough = [step for step in competing(stage)[:RUNNERS_UP] if not imitates_a_step(problem, step)]
     if problem.on_bench:
         return [step for step in enough if not stopped(step, own=True)]
     return [step for step in enough if not (stopped(step) or _worsens(problem, step))]
+
+
+def competing(stage: Sequence[Step]) -> list[Step]:
+    """Return the steps of a stage, in its order, that gain what a name costs and a good part of the best gain."""
+    best = max((step.gain for step in stage), default=0.0)
+    return [step for step in stage if step.gain >= max(PRICE, COMPETING * best)]
 
 
 def _worsens(problem: Problem, step: Step) -> bool:

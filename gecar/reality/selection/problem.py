@@ -203,6 +203,9 @@ class Problem:
 
         It is told by what a model leaves with the most likely small changes of all other parameters.
         """
+        return self.once("slow noise", model.key, make=lambda: self._slow_noise(model))
+
+    def _slow_noise(self, model: Model) -> Array:
         errors = self.residuals.errors(self.with_small_changes(model))
         return self.estimator.blocks.inflation(errors)[list(POSE)]
 

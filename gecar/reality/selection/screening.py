@@ -16,7 +16,7 @@ from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.fitting.parameters import free as free_parameters
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import Minimum, cost_of_each, least_squares
-from gecar.reality.selection.acceptance import is_worthwhile
+from gecar.reality.selection.acceptance import competing, is_worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.thresholds import (
     COMPETING,
@@ -125,22 +125,22 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
 
 
 def _sharing(problem: Problem, model: Model, before: Sequence[Step]) -> list[Step]:
-    """Fit what rivalled the effect taken last beside half of that, which was taken for both. Best first.
+    """Fit each rival of the effect taken last together with half of that effect. Best first.
 
     A high centre of mass stood in for a lower one on tyres that slip: with all of it, no tyres gained anything.
     """
-    estimator = problem.estimator
-    best = max((step.gain for step in before), default=0.0)
-    rivals = [s for s in before if s.effect not in model.effects and s.gain > max(COMPETING * best, PRICE)]
     steps = [
-        problem.once("shared", model.key, rival.model.key, make=partial(_shared, estimator, model, rival))
-        for rival in rivals
+        problem.once(
+            "shared", model.key, rival.model.key, make=partial(_shared, problem.estimator, model, rival)
+        )
+        for rival in competing(before)
+        if rival.effect not in model.effects
     ]
     return _best_of_each(steps)
 
 
 def _shared(estimator: Estimator, model: Model, rival: Step) -> Step:
-    """Fit a rival on top of a model from its own size, and that of the others half way between the two models."""
+    """Fit a rival on top of a model: from its own size, and sizes of the others half way between the two models."""
     effects = (*model.effects, rival.effect)
     parameters = free_parameters(estimator.robot, effects)
     ours, theirs = (parameters.vector(values) for values in (model.values, rival.model.values))

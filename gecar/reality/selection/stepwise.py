@@ -16,6 +16,7 @@ from gecar.reality.materiality import Size
 from gecar.reality.selection.acceptance import (
     at_a_bound,
     candidates,
+    competing,
     imitates_a_step,
     imitates_dry_friction,
     is_material,
@@ -33,7 +34,6 @@ from gecar.reality.selection.screening import candidate_steps, step_of
 from gecar.reality.selection.thresholds import (
     CLOCKS_FIRST,
     CLOCKS_OVER_COMMON,
-    COMPETING,
     LEFT_SHARE,
     MOST_EFFECTS,
     MOST_ON_BENCH,
@@ -353,18 +353,18 @@ def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
 
 
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
-    """Return the chains that begin with a runner-up, where the first took several effects, or with half of a pair.
+    """Return other chains: from runners-up where the first took several effects, from halves of pairs where none.
 
     Where it took none, what fits best may be stopped by a bound, or make whole drives worse, for it stands in for two;
     they then leave no more than is material: what imitates is stopped by bounds, too.
     """
-    rivals = [step for step in first[:BEGINNINGS] if step.gain > max(COMPETING * first[0].gain, PRICE)]
+    firsts = competing(first)[:BEGINNINGS]
     if not chain.steps:
-        pairs = (_beginning_with(problem, first, step) for step in rivals)
+        pairs = (_beginning_with(problem, first, step) for step in firsts)
         return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
     if len(chain.steps) < 2:
         return []
-    runners_up = [step for step in rivals if step is not first[0] and not stopped(step)]
+    runners_up = [step for step in firsts if step is not first[0] and not stopped(step)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
     return [other for other in chains if other is not chain and other.with_camera is None]
 
