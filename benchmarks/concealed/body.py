@@ -73,7 +73,7 @@ def _chassis(concealed: Concealed) -> str:
     ahead = base.mass * concealed.com_ahead / mass
     up = (base.mass * concealed.com_height - 2.0 * WHEEL_MASS * height) / mass - height
     wheels = 2.0 * WHEEL_MASS * (concealed.com_ahead**2 + half_track**2 + 0.3 * height**2)
-    yaw = base.yaw_inertia * (1.0 + concealed.outrigger) - wheels - mass * (ahead - concealed.com_ahead) ** 2
+    yaw = base.yaw_inertia * concealed.yaw_inertia_scale - wheels - mass * (ahead - concealed.com_ahead) ** 2
     # No body turns harder about one axis than about the other two together.
     roll = max(CHASSIS_ROLL_INERTIA, yaw - CHASSIS_PITCH_INERTIA)
     inertia = f"{roll!r} {CHASSIS_PITCH_INERTIA} {yaw!r}"

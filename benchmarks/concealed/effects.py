@@ -256,6 +256,7 @@ EFFECTS: dict[str, Effect] = {
         _added("radius_difference", "right_minus_left", "-", 0.008, 0.10, positive=0.5), "sides", _POSE
     ),
     "track_width": Effect(_scaled("track_scale", "scale", 0.015, 0.12), "track", _POSE),
+    "yaw_inertia": Effect(_scaled("yaw_inertia_scale", "scale", 0.2, 1.5, 0.8), "late"),
     "tyre_friction": Effect(_tyre_friction, "grip", _POSE),
     "slippery_patch": Effect(_slippery_patch, "grip", _POSE),
     "caster_drag": Effect(_added("caster_friction", "coefficient", "-", 0.07, 0.8), "dry"),

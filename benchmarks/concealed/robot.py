@@ -91,6 +91,7 @@ class Concealed:
     radius_scale: float = 1.0
     radius_difference: float = 0.0  # right minus left, over the mean
     track_scale: float = 1.0
+    yaw_inertia_scale: float = 1.0
     tyre_friction: float = 0.9
     patch: tuple[float, float, float, float] | None = None  # x, y, radius [m], coefficient
     caster_friction: float = 0.0
@@ -213,7 +214,6 @@ class Concealed:
     fin: tuple[float, float] | None = (
         None  # greatest torque of a draught [N m], heading it turns the robot to [rad]
     )
-    outrigger: float = 0.0  # share by which the yaw inertia is greater
     nap: tuple[float, float] | None = None  # share of its way that a robot is carried aside, which way [rad]
     wobble: tuple[float, float, float, float] | None = (
         None  # of the line: size, wave length [m], phases x, y [rad]

@@ -82,6 +82,7 @@ _READINGS: Mapping[str, Reading] = {
     "radius_scale": Reading("wheel radius", "mm", _of("wheel_radius", 1e3)),
     "radius_difference": Reading("right wheel's radius larger by", "mm", _of("wheel_radius", 1e3)),
     "track_scale": Reading("track", "mm", _of("track_width", 1e3)),
+    "yaw_inertia_scale": Reading("moment of inertia", "kg cm²", _of("yaw_inertia", 1e4)),
     "tyre_friction": Reading("grip"),
     "patch_radius": Reading("radius", "mm", _MM),
     "patch_x": Reading("at x", "mm", _MM),

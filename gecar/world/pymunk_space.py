@@ -45,7 +45,7 @@ def build_engine(
 def _robot_body(robot: Robot) -> pymunk.Body:
     """Return the robot's body: a box from behind the caster to ahead of the wheels, origin at the centre of mass."""
     physics = robot.physics[0]
-    body = pymunk.Body(float(physics["mass"]), float(physics["yaw_inertia"]))
+    body = pymunk.Body(float(physics["mass"]), float(physics["yaw_inertia"] * physics["yaw_inertia_scale"]))
     half = 0.5 * robot.body.width
     # The caster is under the rear end; the rest of the length reaches ahead of the axle.
     behind = robot.body.caster_ahead - 0.015

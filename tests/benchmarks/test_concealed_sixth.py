@@ -40,7 +40,7 @@ FELT = [
     ({"cut_out": (0.5, 0.03, 0.1)}, STRAIGHT, AHEAD, LESS),
     ({"pulses": (0.3, 1.0, 0.6, 0.0)}, STRAIGHT, AHEAD, LESS),
     ({"clutch": (0.01, LEFT)}, STRAIGHT, TURNED, MORE),
-    ({"outrigger": 4.0}, SPIN, TURNED, LESS),
+    ({"yaw_inertia_scale": 5.0}, SPIN, TURNED, LESS),
     ({"fin": (0.03, math.pi / 2.0)}, STRAIGHT, TURNED, MORE),
     ({"nap": (0.1, 0.0)}, STRAIGHT, AHEAD, MORE),
     ({"nap": (0.1, math.pi)}, STRAIGHT, AHEAD, LESS),

@@ -177,6 +177,18 @@ def test_rotor_inertia_slows_the_start():
     assert history["left_speed"][-1] == pytest.approx(expected, rel=1e-6)
 
 
+def test_yaw_inertia_slows_the_start_of_a_turn_and_of_nothing_else():
+    heavy = with_effect("yaw_inertia", scale=3.0)
+    across = 0.5 * (3.0 * BODY.yaw_inertia + BODY.mass * BODY.com_ahead**2)
+    load = MOTOR.inertia + across * (BODY.wheel_radius / (0.5 * BODY.track_width)) ** 2
+    turn = run(hold(-0.3, 0.3, 0.1), heavy)
+    assert turn["right_speed"][-1] == pytest.approx(
+        steady(0.3) * (1.0 - math.exp(-0.1 * DAMPING / load)), rel=0.01
+    )
+    duties = hold(0.4, 0.4, 0.5)
+    assert run(duties, heavy)["left_angle"] == pytest.approx(run(duties)["left_angle"], rel=1e-6)
+
+
 def test_start_latency_shifts_the_first_motion_and_nothing_else():
     late, duties = with_effect("start_latency", time_s=0.1), hold(0.6, 0.4, 1.0)
     one, other = run(duties)["left_angle"], run(duties, late)["left_angle"]

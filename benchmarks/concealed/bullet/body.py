@@ -61,7 +61,7 @@ def build(client: int, concealed: Concealed) -> Body:
     ahead = base.mass * concealed.com_ahead / mass
     up = (base.mass * concealed.com_height - 2.0 * WHEEL_MASS * mean) / mass - mean
     wheels = 2.0 * WHEEL_MASS * (concealed.com_ahead**2 + lever**2) + WHEEL_INERTIA
-    yaw = base.yaw_inertia * (1.0 + concealed.outrigger) - wheels - mass * (ahead - concealed.com_ahead) ** 2
+    yaw = base.yaw_inertia * concealed.yaw_inertia_scale - wheels - mass * (ahead - concealed.com_ahead) ** 2
     offset = concealed.off_centre or (0.0, 0.0, 0.0)
     height = mean + offset[0]
     ball = pybullet.createCollisionShape(

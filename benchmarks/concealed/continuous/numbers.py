@@ -213,7 +213,7 @@ def numbers(concealed: Concealed) -> Numbers:
     nap, pulses = concealed.nap or (0.0, 0.0), concealed.pulses or (0.0, 1.0, 0.0, 0.0)
     fields = {
         "mass": base.mass,
-        "yaw_inertia": base.yaw_inertia * (1.0 + concealed.outrigger),
+        "yaw_inertia": base.yaw_inertia * concealed.yaw_inertia_scale,
         "com_ahead": concealed.com_ahead,
         "com_height": concealed.com_height,
         "caster": base.caster_ahead,

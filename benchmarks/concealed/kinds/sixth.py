@@ -56,7 +56,7 @@ def _clutch(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
 def _outrigger(rng: Rng, least: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Move weight to the ends of a beam: two times 100 g a quarter of a metre out add 0.0125 to 0.004 kg m^2."""
     share = strength(rng, 0.3, 5.0, least)
-    return {"outrigger": share}, {"share": share}
+    return {"yaw_inertia_scale": 1.0 + share}, {"share": share}
 
 
 @same_in_all

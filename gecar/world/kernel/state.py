@@ -57,7 +57,7 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.late = p.actuation_delay / dt + 0.5  # steps a command is late: half a one, as velocities are
     c.mass = p.mass
     c.inv_mass = 1.0 / p.mass
-    c.inv_inertia = 1.0 / p.yaw_inertia
+    c.inv_inertia = 1.0 / (p.yaw_inertia * p.yaw_inertia_scale)
     c.axle = -p.com_ahead
     c.apart = 0.0
     c.caster = p.caster_ahead - p.com_ahead
