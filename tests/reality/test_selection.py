@@ -20,7 +20,7 @@ from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection import stepwise
-from gecar.reality.selection.acceptance import candidates, stands_out, unevenness, worsens
+from gecar.reality.selection.acceptance import candidates, proved, stands_out, unevenness, worsens
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
@@ -111,6 +111,13 @@ def test_a_step_that_fits_noise_gains_nothing_on_recordings_left_out() -> None:
     assert step.gain >= 0.0
     assert left_out_gains(problem.estimator, step).sum() < 1.0
     assert judged(problem, step).p > 0.05
+
+
+@pytest.mark.parametrize(("p", "proof"), [(0.012, True), (0.013, False)])
+def test_a_step_must_be_significant_among_all_that_are_judged_with_it(p: float, proof: bool) -> None:
+    problem = linear_problem(linear({VISCOUS: 3.0}, RESPONSES))
+    (step,) = explain(problem).steps
+    assert proved(replace(step, p=p)) == proof
 
 
 @pytest.mark.parametrize("least", [-1.0, 0.02])
@@ -432,6 +439,18 @@ def test_what_takes_whole_drives_a_quarter_farther_off_is_a_candidate(
     proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
     assert bool(proof.explained.steps) == kept
     assert bool(proof.candidates) != kept
+
+
+@pytest.mark.parametrize(("now", "kept"), [(0.78, True), (0.82, False)])
+def test_where_only_the_end_of_one_recording_is_set_aside_it_must_come_a_quarter_nearer(
+    monkeypatch: pytest.MonkeyPatch, now: float, kept: bool
+) -> None:
+    """A ripple, once a turn, stood in for wheels off their centres, and brought a drive a tenth nearer."""
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, now))
+    monkeypatch.setattr(confirmation, "_continues", lambda *_: True)
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
+    assert bool(proof.explained.steps) == kept
 
 
 def test_bounds_of_a_share_hold_the_truth_where_residuals_are_correlated() -> None:

@@ -206,7 +206,9 @@ def _is_missed(step: Step, share: Share) -> bool:
 def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, share: Share) -> bool:
     """Whether whole drives set aside come out no worse with an effect.
 
-    None may take all channels together a quarter farther off, whatever small changes would make up for it.
+    None may take all channels together a quarter farther off, whatever small changes would make up for it. Where only
+    the end of the one recording is set aside, they must come a quarter nearer: nothing else tests whether what fits its
+    beginning is a cause.
     They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray. Then
     it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
@@ -215,7 +217,8 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     was, now = _gaps(problem, without, explained.taken, held)
-    if now > WORSE * was and not (held.sensor or problem.on_bench):
+    most = was / WORSE if _continues(held, problem.residuals) else WORSE * was
+    if now > most and not (held.sensor or problem.on_bench):
         return False
     if not explained.unexplained or share.is_whole:
         return not worsens(problem, without, explained.taken, sizes) or (share.is_whole and now < was)
@@ -225,6 +228,12 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
         return True
     is_steady = share.low < 1.0 < share.high and stands_out(problem, step)
     return now < was and is_steady and not worsens(problem, without, explained.taken, sizes)
+
+
+def _continues(held: Residuals, fitted: Residuals) -> bool:
+    """Whether what is set aside is the end of the only recording."""
+    alone = len(held.recordings) == len(fitted.recordings) == 1
+    return alone and held.recordings[0].recording.name == fitted.recordings[0].recording.name
 
 
 def _gaps(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> tuple[float, float]:

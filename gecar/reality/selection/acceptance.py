@@ -157,8 +157,11 @@ def _is_stopped(parameters: Parameters, z: Array, k: int) -> bool:
 
 
 def proved(step: Step) -> bool:
-    """Whether a judged step gains more on left-out recordings than the null distribution allows."""
-    return bool(step.left_out.sum() > step.null_95 and step.p < SIGNIFICANCE)
+    """Whether a judged step gains more on left-out recordings than the null distribution allows.
+
+    As many are judged at a stage as there are runners-up: Bonferroni's correction.
+    """
+    return bool(step.left_out.sum() > step.null_95 and step.p < SIGNIFICANCE / RUNNERS_UP)
 
 
 def is_material(problem: Problem, model: Model, step: Step) -> bool:
