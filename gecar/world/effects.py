@@ -48,10 +48,10 @@ class Parameter:
         Standard deviation of a derivative-free search, in coordinates.
     model_error, model_error_steps
         How far a fitted value may be off because the simulation is not reality: as a share of its size, and in
-        sizes worth a name. Measured against a 3D engine: gears that give add to their play 0.3 to 0.8 degrees there.
-        How tyres slip as load moves differs from engine to engine by 5 mm of the centre of mass's height, and grip
-        found in Bullet's recordings is off by 0.03 to 0.04. A path is off by 1 mm or so where a line lies, along which
-        a robot goes in 4 ms.
+        sizes worth a name, or changes of shape that are visible. Measured against a 3D engine: gears that give add to
+        their play 0.3 to 0.8 degrees there. How tyres slip as load moves differs from engine to engine by 5 mm of the
+        centre of mass's height, and grip found in Bullet's recordings is off by 0.03 to 0.04. A path is off by 1 mm or
+        so where a line lies, along which a robot goes in 4 ms.
     differs
         Standard deviation over motors of one kind and batteries, in that unit; 0: no more than a name is worth.
     smooth

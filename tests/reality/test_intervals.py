@@ -29,6 +29,7 @@ from gecar.reality.uncertainty.intervals import (
     half_widths,
     hulls,
     intervals,
+    model_error,
 )
 from gecar.reality.verdict import Interval
 from gecar.world.effects import BY_ID
@@ -183,6 +184,13 @@ def test_parameters_known_by_their_product_alone_go_as_far_as_a_profile_says(
     # 2 % of duty, by as much as the profile says, and by what the law is off by.
     assert (band.low, band.high) == pytest.approx((1.07, 3.71), abs=0.03)
     assert inertia.high - inertia.low < 0.2
+
+
+def test_waves_a_turn_are_known_to_a_part_of_a_visible_change_even_at_their_neutral_value() -> None:
+    """Once a turn was known to 0.02 %: a share of what it differs from 1 is nothing."""
+    _, waves, *_ = free(EV3, ("torque_ripple",)).coordinates
+    assert waves.parameter.label == "cycles_per_rev"
+    assert model_error(waves, 0.0) * waves.parameter.shape_step == pytest.approx(0.00075)
 
 
 def test_intervals_hold_for_robots_with_and_without_what_is_too_small_to_be_named() -> None:

@@ -70,7 +70,8 @@ def model_error(c: Coordinate, z: float) -> float:
 
     It is half of what the parameter may be off by (`gecar.world.effects.Parameter`).
     """
-    step = c.parameter.model_error_steps if c.parameter.worthwhile > 0.0 else 0.0
+    counts = c.parameter.worthwhile > 0.0 or c.parameter.shape_step > 0.0
+    step = c.parameter.model_error_steps if counts else 0.0
     # A parameter that acts by its ratio has its logarithm for a coordinate: a share of it is a difference there.
     return 0.5 * (c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step)
 
