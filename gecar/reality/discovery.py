@@ -16,7 +16,7 @@ import numpy.typing as npt
 from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
-from gecar.reality.advise.notes import notes_on
+from gecar.reality.advise.notes import notes_on_findings, notes_on_recordings
 from gecar.reality.evidence import Evidence
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
@@ -200,6 +200,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), unexplained)
     unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
+    candidates = [step for stage in stages for step in stage.candidates]
     nothing = not (effects or invented)
     shows = nothing or len(unseen) < len(effects) or any(law.shows for law in invented)
     where = _located(context, stages, fitted, found)
@@ -227,20 +228,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         robot=found.model_copy(update={"name": f"{known.name}-{name}"}),
         limits=seen_from,
         fitted_on=tuple(r.name for r in split.fitted),
-        notes=notes_on(
-            split,
-            fitted,
-            motion.explained.problem.clocks_fitted,
-            where.doubted,
-            [step for stage in stages for step in stage.candidates],
-            valleys(motion.explained.problem, motion.explained.taken)
-            if motion.explained.problem.on_bench
-            else (),
-            motion.left_out,
-            unseen,
-            invented,
-            context.split,
-            found,
+        notes=(
+            *notes_on_findings(
+                split, found, candidates, unseen, invented, motion.left_out, _alike(motion.explained)
+            ),
+            *notes_on_recordings(
+                split, context.split, fitted, motion.explained.problem.clocks_fitted, where.doubted
+            ),
         ),
         evidence=Evidence(
             motion.explained,
@@ -607,6 +601,11 @@ def _with_formulas(found: Contender, formulas: Sequence[Formula]) -> dict[str, M
     """Judge what formulas added to the robot found gain on the recordings set aside."""
     misfits = judge(found, replace(found, correction=with_formulas(formulas)))
     return {column: m for column, m in misfits.items() if m.before != m.after}
+
+
+def _alike(motion: Explanation) -> tuple[tuple[str, ...], ...]:
+    """Return sets of a motor's constants that a bench hardly tells apart."""
+    return valleys(motion.problem, motion.taken) if motion.problem.on_bench else ()
 
 
 def _word(named: bool, invented: bool, unexplained: bool) -> str:

@@ -10,7 +10,7 @@ from support.concealing import EV3, recorded
 from test_location import seen_on_the_course
 from test_start_pose import path_heading
 
-from gecar.reality.advise.notes import DRIFTS, notes_on
+from gecar.reality.advise.notes import DRIFTS, notes_on_findings
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.split import Split
 from gecar.reality.residuals.of_case import motion_residuals
@@ -101,6 +101,6 @@ def test_the_notes_say_why_what_drifts_is_no_finding() -> None:
     step = step_of(problem.estimator, GRIP, problem.known, problem.known)
     split = Split(problem.recordings, (), by_time=False)
     for drifting in (True, False):
-        note, *_ = notes_on(split, problem.residuals, False, False, [replace(step, drifts=drifting)])
+        note, *_ = notes_on_findings(split, EV3, [replace(step, drifts=drifting)])
         assert note.startswith(GRIP)
         assert (DRIFTS in note) is drifting

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from support.concealing import EV3
 
-from gecar.reality.advise.notes import notes_on
+from gecar.reality.advise.notes import notes_on_findings
 from gecar.reality.fitting.model import Model
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording, make_recording
@@ -79,5 +79,5 @@ def test_the_effects_of_a_valley_are_given_as_a_set_and_in_a_note() -> None:
     (together,) = valleys(problem, model)
     assert {VISCOUS, SUPPLY, INERTIA} <= set(together)
     split = hold_out(Case("made", problem.recordings))
-    notes = notes_on(split, problem.residuals, False, False, (), [together])
+    notes = notes_on_findings(split, EV3, alike=[together])
     assert "supply_voltage and viscous_friction apart" in " ".join(notes)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.concealing import EV3, recorded
 
-from gecar.reality.advise.notes import notes_on
+from gecar.reality.advise.notes import notes_on_recordings
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.recordings.recording import Recording
@@ -107,10 +107,10 @@ def test_a_note_tells_what_was_made_good(whole: Recording, noise: Noise) -> None
     logged = Split((only(whole, kept), replace(whole, t_s=whole.t_s + late - late[0])), ())
     split = Split(tuple(mended(run, noise) for run in logged.fitted), ())
     residuals = motion_residuals(split.fitted, noise, MEMORY_S, Threads(1))
-    notes = notes_on(split, residuals, False, False, as_logged=logged)
+    notes = notes_on_recordings(split, logged, residuals, False, False)
     assert any("miss rows, and once the command changed there" in note for note in notes)
     assert any("times of rows in run_0 jitter" in note for note in notes)
-    assert not any("rows" in note for note in notes_on(split, residuals, False, False, as_logged=split)[1:])
+    assert not any("rows" in note for note in notes_on_recordings(split, split, residuals, False, False)[1:])
 
 
 def test_an_encoder_s_wave_adds_to_residuals_what_is_foretold(whole: Recording, noise: Noise) -> None:

@@ -30,46 +30,34 @@ LEFT_OUT = {
 }
 
 
-def notes_on(
+def notes_on_findings(
     split: Split,
-    fitted: Residuals,
-    clocks_fitted: bool,
-    doubted: bool,
+    found: Robot,
     candidates: Sequence[Step] = (),
-    alike: Sequence[Sequence[str]] = (),
-    left_out: str = "",
     unseen: Sequence[str] = (),
     invented: Sequence[Invented] = (),
-    as_logged: Split | None = None,
-    found: Robot | None = None,
+    left_out: str = "",
+    alike: Sequence[Sequence[str]] = (),
 ) -> tuple[str, ...]:
-    """Return notes, a sentence or two each.
+    """Return notes on what was found, a sentence or two each.
 
     Parameters
     ----------
     split
         What was fitted on and set aside.
-    fitted
-        The recordings fitted on, with their nuisances.
-    clocks_fitted
-        Whether each camera's clock offset was fitted.
-    doubted
-        Whether a misfit of readings points to the measured path, rather than to the sensor.
+    found
+        The robot with the effects found.
     candidates
         Effects accepted on the recordings fitted on, and no findings: their size differs between recordings, times or
         regimes, or the recordings set aside do not confirm them.
-    alike
-        Sets of effects of which one can be larger and another smaller at hardly any cost.
-    left_out
-        Encoders or poses, where nothing explains those, so that they were left out.
     unseen
         Effects found that the recordings set aside do not show.
     invented
         Laws found.
-    as_logged
-        The same recordings with the faults of their logs.
-    found
-        The robot with the effects found.
+    left_out
+        Encoders or poses, where nothing explains those, so that they were left out.
+    alike
+        Sets of effects of which one can be larger and another smaller at hardly any cost.
     """
     notes = [
         f"{step.effect} explains the fitted recordings, but {_why_refused(step)}: a candidate, not a finding."
@@ -87,8 +75,7 @@ def notes_on(
         for law in invented
         if split.held and not law.shows
     ]
-    notes += _log_faults(split, as_logged or split)
-    notes += [*battery_at_its_end(found), *never_apart(split, found)] if found else []
+    notes += [*battery_at_its_end(found), *never_apart(split, found)]
     if left_out:
         notes.append(LEFT_OUT[left_out])
     notes += [
@@ -96,6 +83,28 @@ def notes_on(
         "another fits about as well. The intervals say how far."
         for together in alike
     ]
+    return tuple(notes)
+
+
+def notes_on_recordings(
+    split: Split, as_logged: Split, fitted: Residuals, clocks_fitted: bool, doubted: bool
+) -> tuple[str, ...]:
+    """Return notes on the recordings, a sentence or two each.
+
+    Parameters
+    ----------
+    split
+        What was fitted on and set aside.
+    as_logged
+        The same recordings with the faults of their logs.
+    fitted
+        The recordings fitted on, with their nuisances.
+    clocks_fitted
+        Whether each camera's clock offset was fitted.
+    doubted
+        Whether a misfit of readings points to the measured path, rather than to the sensor.
+    """
+    notes = _log_faults(split, as_logged)
     if split.by_time:
         notes.append(
             "There is only one recording: its last part was held out, so validation uses later times of the same run."
