@@ -7,14 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.camera_mark import with_fitted_mark
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
@@ -36,7 +33,7 @@ def marked(run: Recording, mark: tuple[float, float, float] = MARK) -> Recording
 
 def problem(robot: Robot = EV3, mark: tuple[float, float, float] = MARK, runs: int = 4) -> Problem:
     filmed = [marked(recorded(robot, seed), mark) for seed in range(runs)]
-    residuals = motion_residuals(filmed, estimate_noise(filmed, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(filmed)
     return problem_of(residuals, EV3, ("track_width", "pose_delay"))
 
 
@@ -53,7 +50,7 @@ def test_a_mark_over_the_axle_stays_there() -> None:
 
 def test_without_headings_no_mark_is_looked_for() -> None:
     blind = [replace(recorded(EV3, seed), heading_rad=np.full(800, np.nan)) for seed in range(2)]
-    residuals = motion_residuals(blind, estimate_noise(blind, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(blind)
     seen = problem_of(residuals, EV3, ("track_width",))
     assert seen.with_mark(seen.known) is None
 

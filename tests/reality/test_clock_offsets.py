@@ -7,13 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
-from gecar.reality.residuals.of_case import Residuals, motion_residuals
-from gecar.reality.residuals.threads import Threads
+from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.alternatives import ON_THE_ROBOT, late_as_well
 from gecar.reality.selection.problem import Problem, problem_of, scattered
 from gecar.reality.selection.stepwise import explain
@@ -33,7 +31,7 @@ def late(run: Recording, by_s: float) -> Recording:
 
 def beside(*offsets_s: float, robot: Robot = EV3) -> Residuals:
     runs = [late(recorded(robot, seed), offset) for seed, offset in enumerate(offsets_s)]
-    return motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    return motion_of(runs)
 
 
 def test_offsets_come_back_of_residuals_nothing_was_asked_of_before() -> None:

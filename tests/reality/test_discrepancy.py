@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from support.concealing import recorded
+from support.concealing import motion_of, recorded
 from support.linear_case import EV3, bumps, linear, linear_problem
 
 from gecar.cli.commands.discover import discover as command
@@ -127,7 +127,7 @@ def wandering(run: Recording, seed: int) -> Recording:
 def test_slow_errors_of_a_camera_are_not_left_by_the_robot() -> None:
     runs = [recorded(EV3, seed) for seed in range(3)]
     quiet, slow = (
-        problem_of(motion_residuals(each, estimate_noise(each, EV3.physics, 1.0), 1.0, Threads(1)), EV3, ())
+        problem_of(motion_of(each), EV3, ())
         for each in (runs, [wandering(run, seed) for seed, run in enumerate(runs)])
     )
     assert quiet.slow_noise(quiet.known).max() < 1.5
@@ -322,7 +322,7 @@ def test_small_changes_that_are_not_in_proportion_are_fitted_by_replay(
     """A little play, and a little less grip: linear small changes leave more than those fitted."""
     worn = {"backlash": {"angle_deg": 0.7}, "tyre_friction": {"coefficient": 0.82}}
     runs = [recorded(EV3.with_effects(worn), seed) for seed in range(4)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     problem = problem_of(residuals, EV3, ("backlash", "tyre_friction", "track_width", "wheel_radius"))
     problem = problem.under(problem.known)
 

@@ -6,15 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 from test_location import seen_on_the_course
 from test_start_pose import path_heading
 
 from gecar.reality.advise.notes import DRIFTS, notes_on_findings
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.split import Split
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.homogeneity import heterogeneity
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.screening import step_of
@@ -57,7 +54,7 @@ def test_groups_that_hardly_show_an_effect_say_nothing_of_its_size() -> None:
 def grip_alone(robot: Robot) -> Problem:
     """Return the problem of a robot's recordings, in which less grip, other wheels or another track may be found."""
     runs = [recorded(robot, seed) for seed in range(4)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     return problem_of(residuals, EV3, (GRIP, "wheel_radius", "track_width"))
 
 
@@ -87,7 +84,7 @@ def test_light_that_is_not_even_is_no_gain(leaning: float, waxing: float) -> Non
         light = 0.94 + leaning * np.cos(path_heading(run)) + waxing * np.sin(turn * run.t_s + seed)
         dimmed = run.reflection_pct * light
         runs.append(replace(run, reflection_pct=np.round(dimmed)))
-    moved = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    moved = motion_of(runs)
     read = moved.with_paths(EV3.physics).of_sensor()
     explained = explain(problem_of(read, EV3, ("sensor_gain", "sensor_delay")))
     named, drifting = ([s.effect for s in steps] for steps in (explained.steps, explained.drifting))

@@ -9,18 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import t as student
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 from support.linear_case import bumps, linear, linear_problem
 
 from gecar.reality import discovery
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.nuisances import Nuisances, SensorPath
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.stepwise import explain
 from gecar.reality.uncertainty.intervals import (
@@ -142,7 +139,7 @@ def test_the_interval_of_a_patch_holds_the_truth_and_follows_the_seed(
     monkeypatch.setattr("gecar.reality.uncertainty.mcmc.STEPS", 800)
     patch = {"x_m": 1.05, "y_m": 0.52, "radius_m": 0.1, "coefficient": 0.08}
     runs = [recorded(EV3.with_effects({"slippery_patch": patch}), k, seconds=4.0) for k in range(2)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     estimator = problem_of(residuals, EV3, ("slippery_patch",)).estimator
     model = estimator.fit(("slippery_patch",), {"slippery_patch": patch})
     found = intervals(estimator, model, seed=1)["slippery_patch"]
@@ -155,7 +152,7 @@ def test_a_size_known_by_its_product_with_a_share_is_not_neutral() -> None:
     """Commands of 10 % and more never fall into a dead band of 1 %: they tell how much of it each of them loses."""
     effect = "dead_band"
     runs = [recorded(EV3.with_effects({effect: {"duty_pct": 1.0, "offset_share": 1.0}}), k) for k in range(3)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     estimator = problem_of(residuals, EV3, (effect,)).estimator
     model = estimator.fit((effect,), {effect: {"duty_pct": 3.0, "offset_share": 0.3}})
     assert half_widths(estimator, model)[0] > model.z[0]
@@ -170,7 +167,7 @@ def test_parameters_known_by_their_product_alone_go_as_far_as_a_profile_says(
     """A dead band of 1 % with an offset of 1 is hardly one of 2 % with 0.5: a straight line leaves that valley."""
     effects = ("dead_band", "rotor_inertia")
     runs = [recorded(EV3, 0)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     estimator = problem_of(residuals, EV3, effects).estimator
     start = {"dead_band": {"duty_pct": 2.0, "offset_share": 0.5}, "rotor_inertia": {"scale": 0.9}}
     parameters = free(EV3, effects)

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 from test_location import seen_on_the_course
 
 from gecar.cli.actions.discover import draw
@@ -148,7 +148,7 @@ def library_of(*tables, rig="floor"):
 
 
 def library_on(runs):
-    fitted = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    fitted = motion_of(runs)
     problem = problem_of(fitted, EV3, observable(UNRELATED, fitted))
     problem = problem.under(problem.known)
     return Library(problem, problem.known)
@@ -583,7 +583,7 @@ def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
 )
 def test_a_law_of_the_sensors_place_must_move_it_farther_than_its_path_is_known_to(laws, holds):
     run = recorded(EV3, 0)
-    residuals = motion_residuals([run], estimate_noise([run], EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of([run])
     library = SimpleNamespace(problem=SimpleNamespace(residuals=residuals))
     terms = [Term(port=port, law=law) for port, law in laws.items()]
     fitted = SimpleNamespace(physics=lambda _: EV3.physics)

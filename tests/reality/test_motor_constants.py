@@ -6,15 +6,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.concealing import EV3
+from support.concealing import EV3, motion_of
 
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.optimisation.least_squares import least_squares, row_by_row
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.motor_constants import CONSTANTS, implausibility, with_constants
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
@@ -42,7 +39,7 @@ def bench(holds: bool = False) -> Problem:
     held = {"dead_band": {"duty_pct": 8.0, "offset_share": 0.0}} if holds else {}
     robot = EV3.with_effects({**LIGHT_AND_LOW, "coulomb_friction": {"torque_nm": 0.009}, **held})
     runs = [step(robot, level) for level in (5.0, 10.0, 40.0, 70.0, 90.0)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     return problem_of(residuals, EV3, observable(CATALOGUE, residuals))
 
 
@@ -56,7 +53,7 @@ def test_of_sets_of_constants_that_fit_alike_the_most_plausible_is_taken() -> No
 
 def test_nothing_is_named_where_the_constants_are_known() -> None:
     runs = [step(EV3, level) for level in (20.0, 60.0, 90.0)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     problem = problem_of(residuals, EV3, CONSTANTS)
     assert with_constants(problem, problem.known).effects == ()
 

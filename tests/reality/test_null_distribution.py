@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
-from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.screening import candidate_steps
@@ -17,7 +14,7 @@ from gecar.reality.selection.screening import candidate_steps
 def of_noise(effect: str, seed: int) -> Problem:
     """Return the problem of one effect and recordings in which nothing is missing."""
     runs = [recorded(EV3, 10 * seed + k, seconds=4.0) for k in range(3)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     return problem_of(residuals, EV3, (effect,))
 
 

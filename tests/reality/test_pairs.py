@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
-from gecar.reality.noise.sensor_noise import estimate_noise
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.problem import problem_of
 from gecar.reality.selection.stepwise import explain
 
@@ -28,7 +25,7 @@ def test_tyres_and_a_high_centre_of_mass_are_both_found(
         {"load_transfer": {"height_m": height_m}, "tyre_friction": {"coefficient": grip}}
     )
     made = [recorded(robot, first + run, most=most) for run in range(runs)]
-    residuals = motion_residuals(made, estimate_noise(made, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(made)
     explained = explain(problem_of(residuals, EV3, SHOWN_BY_SLIP))
     assert explained.taken.values == {
         "load_transfer": {"height_m": pytest.approx(height_m, rel=0.02)},

@@ -5,17 +5,14 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from support.concealing import EV3
+from support.concealing import EV3, motion_of
 
 from gecar.reality.advise.notes import notes_on_findings
 from gecar.reality.fitting.model import Model
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.recordings.split import hold_out
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.residuals.of_case import motion_residuals
-from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.uncertainty.intervals import intervals
@@ -48,7 +45,7 @@ def one_of_its_kind(seed: int) -> tuple[Problem, dict[str, dict[str, float]]]:
         "start_latency": {"time_s": rng.uniform(0.0, 0.005)},
     }
     runs = [step(EV3.with_effects(truth), level, rng) for level in (60.0, 80.0, 100.0)]
-    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    residuals = motion_of(runs)
     return problem_of(residuals, EV3, observable(CATALOGUE, residuals)), truth
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from gecar.reality.discovery import discover
+from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.replayer import replayer_of
+from gecar.reality.residuals.of_case import Residuals, motion_residuals
+from gecar.reality.residuals.threads import Threads
 from gecar.reality.verdict import Verdict
 from gecar.world.robot import Robot, load_robot
 
 EV3 = load_robot("ev3")
+MEMORY_S = 1.0
 
 
 def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor", most: int = 7) -> Recording:
@@ -38,6 +43,11 @@ def recorded(robot: Robot, seed: int, seconds: float = 8.0, rig: str = "floor", 
         columns["y_m"] = rows[:, 5] + rng.normal(0, 0.001, len(t)) + frames
         columns["heading_deg"] = np.degrees(rows[:, 6]) + rng.normal(0, 0.3, len(t)) + frames
     return make_recording(f"run_{seed}", columns, setup)
+
+
+def motion_of(runs: Sequence[Recording]) -> Residuals:
+    """Residuals of an EV3's motion, with the noise that the recordings tell."""
+    return motion_residuals(runs, estimate_noise(runs, EV3.physics, MEMORY_S), MEMORY_S, Threads(1))
 
 
 @cache
