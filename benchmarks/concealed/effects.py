@@ -275,3 +275,5 @@ EFFECTS: dict[str, Effect] = {
     "clock_skew": Effect(_added("clock_skew", "rate", "-", 0.004, 0.05, positive=0.5), "top speed"),
     "pose_delay": Effect(_added("pose_delay", "time_s", "s", 0.008, 0.15), "pose time", _POSE),
 }
+# Those that plans draw from: had what came later joined the rest, no seed would draw what it drew before.
+PLANNED = tuple(name for name in EFFECTS if name != "yaw_inertia")

@@ -19,7 +19,7 @@ from benchmarks.concealed.cases import (
     seal,
     unlike_neutral,
 )
-from benchmarks.concealed.effects import EFFECTS
+from benchmarks.concealed.effects import EFFECTS, PLANNED
 from benchmarks.concealed.kinds import ALL_OUTSIDE, MET, SETS
 from benchmarks.concealed.kinds.outside import OUTSIDE
 from benchmarks.concealed.worlds import holds
@@ -36,7 +36,7 @@ class Counts:
     """
 
     none: int = 100
-    single: int = 5 * len(EFFECTS)
+    single: int = 5 * len(PLANNED)
     double: int = 40
     outside: int = 3 * len(OUTSIDE)
     triple: int = 0
@@ -129,7 +129,7 @@ def _contents(
 ) -> list[tuple[str, tuple[str, ...]]]:
     """Say what the cases of one world conceal."""
     hidden = SENSORS.get(manner.without, set())
-    effects = [name for name, effect in EFFECTS.items() if hidden.isdisjoint(effect.needs)]
+    effects = [name for name in PLANNED if hidden.isdisjoint(EFFECTS[name].needs)]
     kinds = [name for name in drawable if hidden.isdisjoint(ALL_OUTSIDE[name].needs)]
     contents: list[tuple[str, tuple[str, ...]]] = [("none", ())] * counts.none
     contents += [("single", (effect,)) for effect in _spread(effects, counts.single, rng)]
