@@ -22,11 +22,10 @@ EV3 = load_robot("ev3")
 ROW_S, SECONDS = 0.01, 6.0
 
 
-def run(gap_s: float | None) -> Recording:
-    """Return a recording of commands, without the row at a time."""
+def run() -> Recording:
+    """Return a recording of commands."""
     t_s = np.arange(0.0, SECONDS, 0.1)
-    kept = np.ones(len(t_s), bool) if gap_s is None else np.abs(t_s - gap_s) > 0.05
-    return make_recording("made", dict.fromkeys(("t_s", "left_duty_pct", "right_duty_pct"), t_s[kept]))
+    return make_recording("made", dict.fromkeys(("t_s", "left_duty_pct", "right_duty_pct"), t_s))
 
 
 @dataclass(frozen=True)
@@ -38,11 +37,10 @@ class LinearResiduals:
     noise: np.ndarray
     count: int
     sensor: bool = False
-    gap_s: float | None = None
 
     @property
     def recordings(self) -> tuple[Any, ...]:
-        return tuple(SimpleNamespace(recording=run(self.gap_s)) for _ in range(self.count))
+        return tuple(SimpleNamespace(recording=run()) for _ in range(self.count))
 
     @property
     def instrument_errors(self) -> np.ndarray:

@@ -65,8 +65,8 @@ def notes_on_findings(
     ]
     others, part = ("others", "of them") if len(split.fitted) > 1 else ("other one", "third of it")
     notes += [
-        f"The held-out recordings do not show {effect}. It was found on the {others}"
-        + ("." if BY_ID[effect].at_a_place else f", and each {part} that shows it, left out, confirms it.")
+        f"The held-out recordings do not show {effect}. It was found on the {others}, and each {part} that shows it,"
+        " left out, confirms it."
         for effect in unseen
     ]
     notes += [

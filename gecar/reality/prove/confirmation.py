@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.gain_offset import EFFECT as GAIN
 from gecar.reality.fitting.model import Model, Step
-from gecar.reality.noise.excess_energy import SPAN_S
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, gaps, reading_error
 from gecar.reality.replay.channels import ResidualIndex
@@ -23,15 +22,12 @@ from gecar.reality.selection.share import (
     UNSEEN,
     Share,
     share_asked_for,
-    sums_of_spans,
 )
 from gecar.reality.selection.stepwise import Explanation, concluded, explain
 from gecar.reality.selection.thresholds import MAIN_SHARE, WHOLE_SHARE, WORSE
 from gecar.world.effects import BY_ID
 
 Array = npt.NDArray[np.float64]
-APART_S = 1.5  # between two passes of a place
-BEFORE_S = 0.5  # before an effect shows, in which a row that is missing may be why
 
 
 @dataclass(frozen=True)
@@ -77,9 +73,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
     it was fitted, predicts worse than none (`share_asked_for`). Where they do not show an effect at all, the
-    recordings fitted on that do must ask for it, each with everything fitted to the others; a place on the floor must
-    then show twice, or where no row of the log is missing. Whole drives must not come out worse with the effect; where
-    much is left that nothing explains, they must come out better.
+    recordings fitted on that do must ask for it, each with everything fitted to the others. Whole drives must not come
+    out worse with the effect; where much is left that nothing explains, they must come out better.
 
     Parameters
     ----------
@@ -94,15 +89,12 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
         without = {s.effect: _without(explained.problem, explained.taken, s) for s in explained.steps}
         judged = [_judged(explained, held, step, without[step.effect], with_all) for step in explained.steps]
         unseen = {s.effect for s, share in judged if share is UNSEEN}
-        places = {s.effect for s in explained.steps if s.effect in unseen and BY_ID[s.effect].at_a_place}
         judged = [
-            _left_out(explained, s, without[s.effect]) if s.effect in unseen - places else (s, share)
+            _left_out(explained, s, without[s.effect]) if s.effect in unseen else (s, share)
             for s, share in judged
         ]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        # What no other recording tests may stand in for whatever else is unexplained.
-        stay = {e for e in places if not (explained.unexplained or _is_beside_a_gap(explained, without[e]))}
-        failing = [(s, share) for s, share in judged if share.margin <= 0.0 and s.effect not in stay]
+        failing = [(s, share) for s, share in judged if share.margin <= 0.0]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)
         else:
@@ -177,30 +169,9 @@ def _shown(explained: Explanation, without: Model) -> Array:
     return np.asarray((errors(without.physics) - errors(explained.taken.physics)) ** 2)
 
 
-def _is_beside_a_gap(explained: Explanation, without: Model) -> bool:
-    """Whether an effect shows only once in the fitted recordings, at a moment where the log misses a row.
-
-    Then what looks like a place may be a command that came earlier or later than the log says.
-    """
-    residuals = explained.problem.residuals
-    passes = []
-    for number, sums in sums_of_spans(residuals.index, _shown(explained, without)).items():
-        shown_s = SPAN_S * np.flatnonzero(sums >= LEAST_SHOWN)
-        parts = np.split(shown_s, np.flatnonzero(np.diff(shown_s) > APART_S) + 1)
-        passes += [(residuals.recordings[number].recording, part[0], part[-1]) for part in parts if len(part)]
-    if len(passes) != 1:
-        return False
-    recording, first_s, last_s = passes[0]
-    gaps_s = recording.t_s[recording.gaps] - recording.t_s[0]
-    return bool(np.any((gaps_s > first_s - BEFORE_S) & (gaps_s < last_s + SPAN_S)))
-
-
 def _is_missed(step: Step, share: Share) -> bool:
-    """Whether an effect is a place that whole drives cannot judge: none shows it, or recordings ask for all of it.
-
-    A drive slightly off its path misses it.
-    """
-    return BY_ID[step.effect].at_a_place and (share is UNSEEN or share.is_whole)
+    """Whether an effect is a place, all of which recordings ask for: a drive slightly off its path misses it."""
+    return BY_ID[step.effect].at_a_place and share.is_whole
 
 
 def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, share: Share) -> bool:

@@ -194,7 +194,7 @@ class _Search:
         least = least_share_expected(held.index, noise, after - before, SURE)
         if math.isinf(least):
             shown = np.bincount(problem.parts, change**2) >= LEAST_SHOWN
-            return math.inf if BY_ID[self._effect].at_a_place or np.sum(shown) > 1 else 0.0
+            return math.inf if np.sum(shown) > 1 else 0.0
         if least > 0.0:
             made_up = held.errors(problem.with_changes_for(self._model, -change))
             least = min(least, least_share_expected(held.index, noise, after - made_up, SURE))
