@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=SETS,
         default=MET,
         help="from which set physics outside the catalogue is drawn: that met so far (default); last: also what was "
-        "kept for a last examination; final, unmet, fresh, sixth: of these sets alone",
+        "kept for a last examination; final, unmet, fresh, sixth, seventh: of these sets alone",
     )
     plan.add_argument(
         "--pace",

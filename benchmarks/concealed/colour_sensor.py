@@ -16,10 +16,11 @@ _HALF = LINE_WIDTH / 2.0
 _OUTER = (0.15 - _HALF, 0.15 - _HALF, 2.25 + _HALF, 1.05 + _HALF)  # x0, y0, x1, y1
 _INNER = (0.15 + _HALF, 0.15 + _HALF, 2.25 - _HALF, 1.05 - _HALF)
 _SLICES = 24
+_RISES_S = 0.05  # time constant with which a robot that shakes with its speed lifts the sensor
 _DIMMEST = 10.0  # %: a gain that follows the mean light grows no further
 
 
-def line_share(x: float, y: float, diameter: float) -> float:
+def line_share(x: float, y: float, diameter: float, wider: float = 0.0) -> float:
     """Share of a round spot that lies on the line.
 
     Parameters
@@ -28,6 +29,8 @@ def line_share(x: float, y: float, diameter: float) -> float:
         Middle of the spot in the course's frame [m].
     diameter
         Of the spot [m].
+    wider
+        More than the line is wide as drawn [m].
 
     Returns
     -------
@@ -35,7 +38,10 @@ def line_share(x: float, y: float, diameter: float) -> float:
         0 on bare floor, 1 on the line. Exact along the sides; by slices at the corners, within 0.002.
     """
     radius = diameter / 2.0
-    return _share_inside(_OUTER, x, y, radius) - _share_inside(_INNER, x, y, radius)
+    more = wider / 2.0
+    outer = (_OUTER[0] - more, _OUTER[1] - more, _OUTER[2] + more, _OUTER[3] + more)
+    inner = (_INNER[0] + more, _INNER[1] + more, _INNER[2] - more, _INNER[3] - more)
+    return _share_inside(outer, x, y, radius) - _share_inside(inner, x, y, radius)
 
 
 def _share_inside(box: tuple[float, float, float, float], x: float, y: float, radius: float) -> float:
@@ -97,6 +103,8 @@ class ColourSensor:
         ]  # the loose mount: ahead, left [m] and their rates, in the robot's frame
         self._moving = (0.0, 0.0)  # velocity of the mount in the course's frame [m/s]
         self._axle = (math.nan, math.nan)  # where its centre was a tick ago [m]
+        self._shaken: tuple[float, float] | None = None  # where the axle's centre was a tick ago [m]
+        self._shaking = 0.0  # mean speed, whichever way [m/s]
         self._pace = 0.0  # speed to which the robot's pitch has settled [m/s]
 
     def look(self, x: float, y: float, heading: float) -> float:
@@ -130,6 +138,8 @@ class ColourSensor:
             light *= self._gain(light)
         if self._hidden.nod is not None:
             light *= self._nodded(x, y, heading)
+        if self._hidden.speed_lift > 0.0:
+            light *= self._lifted(x, y)
         self._ticks += 1
         return self._hidden.sensor_gain * light + self._hidden.sensor_offset_pct
 
@@ -150,6 +160,14 @@ class ColourSensor:
         self._pace += TICK_S * pitched
         return max(1.0 - lost * pitched, 0.0)
 
+    def _lifted(self, x: float, y: float) -> float:
+        """Give the share of light that comes back to a sensor that the robot's speed lifts."""
+        old_x, old_y = self._shaken or (x, y)
+        self._shaken = (x, y)
+        speed = math.hypot(x - old_x, y - old_y) / TICK_S
+        self._shaking += TICK_S / _RISES_S * (speed - self._shaking)
+        return max(1.0 - self._hidden.speed_lift * self._shaking, 0.0)
+
     def _floor(self, x: float, y: float, heading: float) -> float:
         hidden = self._hidden
         cos, sin = math.cos(heading), math.sin(heading)
@@ -165,11 +183,12 @@ class ColourSensor:
             _, on, aside = hidden.second_spot
             other = self._printed(spot_x + cos * on - sin * aside, spot_y + sin * on + cos * aside)
         spot_x, spot_y = self._printed(spot_x, spot_y)
-        dark = line_share(spot_x, spot_y, hidden.spot_diameter)
+        dark = line_share(spot_x, spot_y, hidden.spot_diameter, hidden.line_wider)
         if hidden.faded is not None:
             dark *= self._ink(spot_x, spot_y)
         if hidden.second_spot is not None and other is not None:
-            dark += hidden.second_spot[0] * (line_share(*other, hidden.spot_diameter) - dark)
+            also = line_share(*other, hidden.spot_diameter, hidden.line_wider)
+            dark += hidden.second_spot[0] * (also - dark)
         light = 100.0 * (1.0 - dark)
         if hidden.ambient is not None:
             loss, source = hidden.ambient

@@ -15,6 +15,7 @@ _RUB_BLEND = 0.5  # rad/s: below this difference of speeds the axles' rubbing fa
 _LOSS_BLEND = 0.2  # rad/s: below this what gears lose fades out, so that it cannot drive the robot
 _GREASE_BLEND = 0.3  # rad/s: below this grease, being a liquid, gives way
 _HUM_BLEND = 0.2  # rad/s: below this what a resonance takes fades out
+_MOST_SYNCED = 0.3  # share of the supply by which keeping two motors together changes a duty at most
 _BAND_SLIPS = 10.0  # rad: a rubber band round the axle slips rather than winding up for ever
 
 
@@ -60,6 +61,9 @@ class DriveTrain:
         self._warm = [0.0, 0.0]  # of each motor's fuse, 1 where its rated current brings it
         self._borne = [0.0, 0.0]  # for how long each driver has borne too much current [s]
         self._off_until = [0.0, 0.0]  # s
+        self._stuck = [0.0, 0.0]  # duties that act until others are far enough from them [%]
+        self._alike = False  # whether both motors are given the same, and not nothing
+        self._lead: float | None = None  # of the left motor before the right when that began [rad]
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
         """Pass one tick's command through delay, ramp, cap and dead band.
@@ -76,19 +80,7 @@ class DriveTrain:
         tuple[float, float]
             Share of the terminal voltage across each motor, signed.
         """
-        for start, length in self._hidden.dropouts:
-            if start <= time_s < start + length:
-                command_pct = (0.0, 0.0)
-        if self._hidden.latch is not None:
-            period, gone = self._hidden.latch
-            ticking = math.floor(time_s / period + gone)
-            if ticking > self._polled[0]:
-                self._polled = ticking, command_pct
-            command_pct = self._polled[1]
-        if self._hidden.throttle is not None:
-            left, right = command_pct
-            command_pct = self._throttled(0, left, time_s), self._throttled(1, right, time_s)
-        self._queue.append(command_pct)
+        self._queue.append(self._heard(command_pct, time_s))
         late = self._queue.popleft()
         most = self._hidden.command_slew * TICK_S
         if most < math.inf:
@@ -98,12 +90,44 @@ class DriveTrain:
             self._ramped = late
         if self._hidden.reversal_pause > 0.0:
             late = self._paused(0, late[0], time_s), self._paused(1, late[1], time_s)
+        self._alike = late[0] == late[1] != 0.0
         left, right = self._shaped(late[0]), self._shaped(late[1])
+        if abs(left) + abs(right) > self._hidden.duty_budget:
+            left, right = self._rationed(left, right)
         if left != 0.0 and right != 0.0:
             left, right = left * (1.0 - self._hidden.shared_drop), right * (1.0 - self._hidden.shared_drop)
         if self._hidden.wander is not None:
             left, right = self._wandered(0, left, time_s), self._wandered(1, right, time_s)
         return left * self._gains[0], right * self._gains[1]
+
+    def _heard(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
+        """Give what the firmware makes of a command before it passes it on, if it hears it at all."""
+        for start, length in self._hidden.dropouts:
+            if start <= time_s < start + length:
+                command_pct = (0.0, 0.0)
+        if self._hidden.latch is not None:
+            period, gone = self._hidden.latch
+            ticking = math.floor(time_s / period + gone)
+            if ticking > self._polled[0]:
+                self._polled = ticking, command_pct
+            command_pct = self._polled[1]
+        if self._hidden.sticky_pct > 0.0:
+            command_pct = self._unstuck(0, command_pct[0]), self._unstuck(1, command_pct[1])
+        if self._hidden.throttle is not None:
+            left, right = command_pct
+            command_pct = self._throttled(0, left, time_s), self._throttled(1, right, time_s)
+        return command_pct
+
+    def _unstuck(self, side: int, duty_pct: float) -> float:
+        """Give the duty that acts: a new one only if it is nothing, or far enough from the last that did."""
+        if duty_pct == 0.0 or abs(duty_pct - self._stuck[side]) >= self._hidden.sticky_pct:
+            self._stuck[side] = duty_pct
+        return self._stuck[side]
+
+    def _rationed(self, left: float, right: float) -> tuple[float, float]:
+        """Scale both duties so that together they keep within the budget."""
+        share = self._hidden.duty_budget / (abs(left) + abs(right))
+        return left * share, right * share
 
     def _wandered(self, side: int, duty: float, time_s: float) -> float:
         """Change one motor's drive by what is drawn for every half second, and lies between two draws in between."""
@@ -155,6 +179,8 @@ class DriveTrain:
         """
         if self._hidden.keeper is not None:
             duties = self._keep(0, duties[0], speeds[0]), self._keep(1, duties[1], speeds[1])
+        if self._hidden.motor_sync > 0.0:
+            duties = self._together(duties, angles)
         if self._hidden.holding > 0.0:
             duties = self._hold(0, duties[0], angles[0]), self._hold(1, duties[1], angles[1])
         if self._hidden.cut_out is not None:
@@ -195,6 +221,18 @@ class DriveTrain:
         kept = min(max(self._kept[side] + TICK_S * rate * lacking, -most), most)
         self._kept[side] = kept if duty != 0.0 else 0.0
         return min(max(duty + self._kept[side], -1.0), 1.0)
+
+    def _together(self, duties: tuple[float, float], angles: tuple[float, float]) -> tuple[float, float]:
+        """Hold back the motor that has got ahead of the other since both were first given the same."""
+        lead = angles[0] - angles[1]
+        if not self._alike:
+            self._lead = None
+            return duties
+        if self._lead is None:
+            self._lead = lead
+        wanted = self._hidden.motor_sync * (lead - self._lead) / 2.0
+        fix = min(max(wanted, -_MOST_SYNCED), _MOST_SYNCED)
+        return min(max(duties[0] - fix, -1.0), 1.0), min(max(duties[1] + fix, -1.0), 1.0)
 
     def _hold(self, side: int, duty: float, angle: float) -> float:
         """Drive a motor that is given nothing back to where it was when that began."""
@@ -282,6 +320,8 @@ class DriveTrain:
             torque -= usual * grown / (1.0 + grown)
         if hidden.coasting > 0.0 and volts == 0.0:
             torque -= usual * hidden.coasting
+        if hidden.overrun > 0.0 and volts * usual < 0.0:
+            torque -= usual * hidden.overrun
         most = hidden.current_limit * self._base.torque_constant
         if abs(usual) > most:
             torque -= math.copysign(abs(usual) - most, usual)

@@ -285,7 +285,10 @@ def seen_pose(
     if concealed.backlog is not None:
         most, period, gone = concealed.backlog
         shown = shown - most * ((times / period + gone) % 1.0)
-    pose = np.stack([np.interp(shown, history.time_s, column) for column in history.pose.T])
+    if concealed.predictor is None:
+        pose = np.stack([np.interp(shown, history.time_s, column) for column in history.pose.T])
+    else:
+        pose = _predicted(history, shown, *concealed.predictor)
     ahead, left = concealed.marker
     if (ahead, left) != (0.0, 0.0):
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -295,6 +298,8 @@ def seen_pose(
         away, pose[2] = _askew(away, pose[2], np.array(concealed.keystone))
     if concealed.aspect != 0.0:
         away, pose[2] = _stretched(away, pose[2], concealed.aspect)
+    if concealed.stitch is not None:
+        away, pose[2] = _stitched(away, pose[2], *concealed.stitch)
     away = away * (1.0 + concealed.lens * np.sum(away**2, axis=0))
     turn = math.radians(concealed.pose_drift_deg) * times + math.radians(concealed.camera_turn_deg)
     if concealed.camera_bump is not None:
@@ -314,6 +319,32 @@ def seen_pose(
         size, periods, phase = concealed.compass
         turn = turn + size * np.sin(periods * pose[2] + phase)
     return x, y, pose[2] + turn
+
+
+def _predicted(history: History, shown: Array, ahead_s: float, mean_s: float) -> Array:
+    """See poses (3, rows) that a tracker extrapolates from earlier ones by the mean velocity until then."""
+    keep = math.exp(-TICK_S / mean_s)
+    velocity = np.diff(history.pose, axis=0, prepend=history.pose[:1]) / TICK_S
+    mean = lfilter([1.0 - keep], [1.0, -keep], velocity, axis=0)
+    then = shown - ahead_s
+    return np.stack(
+        [
+            np.interp(then, history.time_s, place) + ahead_s * np.interp(then, history.time_s, speed)
+            for place, speed in zip(history.pose.T, mean.T, strict=True)
+        ]
+    )
+
+
+def _stitched(
+    away: Array, heading: Array, seam_x: float, shift_x: float, shift_y: float, turn: float, larger: float
+) -> tuple[Array, Array]:
+    """See places (2, rows) and headings beyond a seam by a second camera, whose picture is off."""
+    from_seam = seam_x - FIELD[0] / 2.0
+    beyond = (away[0] > from_seam).astype(np.float64)
+    off_x, off_y, scale = away[0] - from_seam, away[1], 1.0 + larger
+    cos, sin = scale * math.cos(turn) - 1.0, scale * math.sin(turn)
+    moved = np.stack([cos * off_x - sin * off_y + shift_x, sin * off_x + cos * off_y + shift_y])
+    return away + beyond * moved, heading + beyond * turn
 
 
 def _stretched(away: Array, heading: Array, share: float) -> tuple[Array, Array]:

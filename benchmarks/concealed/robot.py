@@ -227,6 +227,24 @@ class Concealed:
         None  # deviation of the heading [rad], periods a turn, phase [rad]
     )
 
+    # Outside the catalogue, from the seventh set of kinds.
+    overrun: float = 0.0  # share of the braking that is missing where a motor outruns the duty it is given
+    motor_sync: float = 0.0  # share of the supply per angle that one motor leads by, given alike [1/rad]
+    sticky_pct: float = 0.0  # a new duty, other than 0, acts only if it is at least so far from the last [%]
+    duty_budget: float = math.inf  # both duties are scaled so that their sizes add up to no more than this
+    # Drag of a brush on the floor [N], and where it hangs, ahead and left of the axle's centre [m].
+    brush: tuple[float, float, float] | None = None
+    curl: tuple[float, float] | None = None  # slope of the mat at its edges [rad], from how far inside on [m]
+    leak: tuple[float, float, int] | None = None  # share of a wheel's radius lost at last, time [s], side
+    turret: tuple[float, float, float] | None = None  # torque of its swings [N m], period [s], phase [rad]
+    line_wider: float = 0.0  # m, more than the line is wide as drawn
+    speed_lift: float = 0.0  # share of light lost per speed ahead or back [s/m]
+    # Where two cameras' pictures meet, x [m]; how the second one's is off: shift x, y [m], turn [rad], scale.
+    stitch: tuple[float, float, float, float, float] | None = None
+    predictor: tuple[float, float] | None = (
+        None  # for how long poses are extrapolated [s], by a mean over [s]
+    )
+
     # What every robot has a little of (background.py). The scales act only in worlds that model the thing.
     inductance_scale: float = 1.0
     presliding_scale: float = 1.0  # of the gear's deflection before it slides

@@ -45,17 +45,21 @@ class Surroundings:
         drags = concealed.air_drag or concealed.pile or concealed.swivel or concealed.yaw_pull
         hauled = concealed.trailer or concealed.twist
         dragged = concealed.hair or concealed.grooves or concealed.fan or concealed.scrub or concealed.fin
+        hung = concealed.brush or concealed.turret
         self._pushed = bool(
-            concealed.tether or concealed.magnet or concealed.gusts or drags or hauled or dragged
+            concealed.tether or concealed.magnet or concealed.gusts or drags or hauled or dragged or hung
         )
         self._braked = bool(
             concealed.rolling_resistance or concealed.strip or concealed.frame_rub or concealed.patches
         )
+        self._rubbed = bool(concealed.hair or concealed.grooves or concealed.brush)
         self._gripped = bool(concealed.patch or concealed.dust or concealed.hop)
         self.idle = not (
             self._pushed
             or self._gripped
             or concealed.waves
+            or concealed.curl
+            or concealed.leak
             or concealed.rocking
             or self._braked
             or concealed.nap
@@ -75,6 +79,7 @@ class Surroundings:
         """Set what does not change while driving, and undo what the last drive left behind."""
         self._lean(*self._hidden.tilt)
         self._model.pair_friction[self._tyres, :2] = self._hidden.tyre_friction
+        self._shrink(0.0)
 
     def act(self, state: mujoco.MjData, time_s: float) -> None:
         """Set the forces of one tick.
@@ -89,12 +94,9 @@ class Surroundings:
         x, y = float(state.qpos[0]), float(state.qpos[1])
         if self._gripped:
             self._grip(x, y, state)
-        if self._hidden.waves is not None:
-            slope, length, phase_x, phase_y = self._hidden.waves
-            (tilt_x, tilt_y), turn = self._hidden.tilt, 2.0 * math.pi / length
-            self._lean(
-                tilt_x + slope * math.sin(turn * x + phase_x), tilt_y + slope * math.sin(turn * y + phase_y)
-            )
+        self._shrink(time_s)
+        if self._hidden.waves is not None or self._hidden.curl is not None:
+            self._lean(*self._sloping(x, y))
         if self._hidden.rocking is not None:
             slope, _, way, _ = self._hidden.rocking
             (tilt_x, tilt_y), leaning = self._hidden.tilt, slope * self._tip(x, y)
@@ -109,11 +111,12 @@ class Surroundings:
             heading = _heading(state)
             force_x, force_y = self._push(x, y, state.qvel, time_s)
             drag_x, drag_y, turning = self._drag(heading, state.qvel)
+            turning += self._swing(time_s)
             if self._hidden.trailer is not None:
                 haul_x, haul_y, hauling = self._haul(x, y, heading)
                 drag_x, drag_y, turning = drag_x + haul_x, drag_y + haul_y, turning + hauling
-            if self._hidden.hair is not None or self._hidden.grooves is not None:
-                rub_x, rub_y, rubbing = self._rub_caster(heading, state.qvel)
+            if self._rubbed:
+                rub_x, rub_y, rubbing = self._rub(heading, state.qvel)
                 drag_x, drag_y, turning = drag_x + rub_x, drag_y + rub_y, turning + rubbing
             state.xfrc_applied[self._chassis] = [force_x + drag_x, force_y + drag_y, 0.0, 0.0, 0.0, turning]
         if self._braked:
@@ -127,6 +130,30 @@ class Surroundings:
             GRAVITY * math.sin(along_y),
             GRAVITY * down,
         ]
+
+    def _sloping(self, x: float, y: float) -> tuple[float, float]:
+        """Give the slope here of a floor with waves, or of a mat that curls up at its edges [rad]."""
+        along_x, along_y = self._hidden.tilt
+        if self._hidden.waves is not None:
+            slope, length, phase_x, phase_y = self._hidden.waves
+            turn = 2.0 * math.pi / length
+            along_x, along_y = (
+                along_x + slope * math.sin(turn * x + phase_x),
+                along_y + slope * math.sin(turn * y + phase_y),
+            )
+        if self._hidden.curl is not None:
+            slope, wide = self._hidden.curl
+            along_x += slope * _curled(x, FIELD[0], wide)
+            along_y += slope * _curled(y, FIELD[1], wide)
+        return along_x, along_y
+
+    def _shrink(self, time_s: float) -> None:
+        """Give a tyre that loses its air the radius that it has now."""
+        if self._hidden.leak is None:
+            return
+        lost, time, side = self._hidden.leak
+        left = 1.0 - lost * (1.0 - math.exp(-time_s / time))
+        self._model.geom_size[list(self._geoms)[side], 0] = self._radii[side] * left
 
     def _tip(self, x: float, y: float) -> float:
         """Let a table on uneven legs tip to the side where the robot is; give how far it has, from -1 to 1."""
@@ -194,6 +221,17 @@ class Surroundings:
             turning += arm * side * math.cos(self._castor - heading)
         return force_x, force_y, turning
 
+    def _swing(self, time_s: float) -> float:
+        """Torque on the chassis of an arm that swings to and fro on it [N m]."""
+        torque, period, phase = self._hidden.turret or (0.0, 1.0, 0.0)
+        return torque * math.sin(2.0 * math.pi * time_s / period + phase)
+
+    def _rub(self, heading: float, velocity: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+        """Force [N] and torque [N m] of what rubs on the floor besides the tyres: a brush, or the caster."""
+        forces = zip(self._brush(heading, velocity), self._rub_caster(heading, velocity), strict=True)
+        force_x, force_y, turning = (brush + caster for brush, caster in forces)
+        return force_x, force_y, turning
+
     def _rub_caster(self, heading: float, velocity: npt.NDArray[np.float64]) -> tuple[float, float, float]:
         """Force [N] and torque [N m] of hair round the caster's ball and of grooves that it runs in."""
         hidden, force_x, force_y = self._hidden, 0.0, 0.0
@@ -210,6 +248,18 @@ class Surroundings:
             held = most * math.tanh((math.cos(along) * vy - math.sin(along) * vx) / _DRAG_BLEND)
             force_x, force_y = force_x + held * math.sin(along), force_y - held * math.cos(along)
         return force_x, force_y, (back - hidden.com_ahead) * (cos * force_y - sin * force_x)
+
+    def _brush(self, heading: float, velocity: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+        """Force [N] and torque [N m] of a brush that rubs on the floor, against its own way."""
+        most, ahead, left = self._hidden.brush or (0.0, 0.0, 0.0)
+        cos, sin, rate = math.cos(heading), math.sin(heading), float(velocity[5])
+        vx = float(velocity[0]) - rate * (sin * ahead + cos * left)
+        vy = float(velocity[1]) + rate * (cos * ahead - sin * left)
+        speed = max(math.hypot(vx, vy), 1e-9)
+        drag = most * math.tanh(speed / _DRAG_BLEND) / speed
+        along, across = -drag * (cos * vx + sin * vy), -drag * (cos * vy - sin * vx)
+        turning = (ahead - self._hidden.com_ahead) * across - left * along
+        return -drag * vx, -drag * vy, turning
 
     def _haul(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
         """Force [N] and torque [N m] of a weight that a string drags behind the caster; none while it is slack."""
@@ -322,6 +372,11 @@ class Surroundings:
                 mujoco.mj_contactForce(self._model, state, index, self._scratch)
                 loads[side] += self._scratch[0]
         return loads
+
+
+def _curled(place: float, length: float, wide: float) -> float:
+    """Give the share of its edges' slope that a curled mat has here, down to the middle."""
+    return min(max(1.0 - place / wide, 0.0), 1.0) - min(max(1.0 - (length - place) / wide, 0.0), 1.0)
 
 
 def _heading(state: mujoco.MjData) -> float:

@@ -120,7 +120,7 @@ def test_an_old_seed_plans_what_it_planned_before(background, kinds, digest):
     assert hashlib.sha256(told.encode()).hexdigest()[:16] == digest
 
 
-@pytest.mark.parametrize("kinds", ["final", "unmet", "fresh", "sixth"])
+@pytest.mark.parametrize("kinds", ["final", "unmet", "fresh", "sixth", "seventh"])
 def test_the_command_plans_cases_of_a_set_alone(monkeypatch, tmp_path, kinds):
     drawn = []
     monkeypatch.setattr("benchmarks.concealed.plan.draw_all", lambda cases, out, workers: drawn.extend(cases))

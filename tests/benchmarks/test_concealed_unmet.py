@@ -122,7 +122,9 @@ def test_at_most_two_kinds_differ_from_run_to_run():
 
 def test_sets_share_no_name_and_kinds_unmet_are_drawn_alone_or_not_at_all():
     assert len(UNMET) >= 12
-    assert len(ALL_OUTSIDE) == sum(len(SETS[name]) for name in ("last", "final", "unmet", "fresh", "sixth"))
+    assert len(ALL_OUTSIDE) == sum(
+        len(SETS[name]) for name in ("last", "final", "unmet", "fresh", "sixth", "seventh")
+    )
     for manner in (Manner("continuous", background=True), Manner("mujoco")):
         assert outside_kinds(manner, "unmet") == list(UNMET)
         assert not set(UNMET) & {

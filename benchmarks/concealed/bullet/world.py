@@ -17,7 +17,7 @@ from benchmarks.concealed.bullet.body import (
     Body,
     build,
 )
-from benchmarks.concealed.colour_sensor import ColourSensor
+from benchmarks.concealed.colour_sensor import FIELD, ColourSensor
 from benchmarks.concealed.continuous import chassis, drive
 from benchmarks.concealed.continuous.firmware import Firmware
 from benchmarks.concealed.continuous.numbers import Numbers, gusts, numbers
@@ -75,7 +75,8 @@ class Truth:
                     if command is None or (ended is not None and ended(x, y)):
                         return _finished(log.until(tick + 1))
                 log.commands[tick] = command
-                robot.advance(self._numbers, self._gusts, firmware.duties(command or (0, 0), time_s), time_s)
+                shares = np.array([*firmware.duties(command or (0, 0), time_s), firmware.alike])
+                robot.advance(self._numbers, self._gusts, shares, time_s)
                 log.terminal_v[tick] = robot.terminal_v
         finally:
             robot.leave()
@@ -114,6 +115,8 @@ class _Robot:
             not still
             or concealed.twist > 0.0
             or concealed.scrub > 0.0
+            or concealed.brush is not None
+            or concealed.turret is not None
             or bool(concealed.gusts)
             or any(pull is not None for pull in pulls)
         )
@@ -145,11 +148,11 @@ class _Robot:
         axle, _ = pybullet.multiplyTransforms(place, way, self._body.axle, [0.0, 0.0, 0.0, 1.0])
         return axle[0], axle[1], math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
-    def advance(self, n: Numbers, blows: Array, duties: tuple[float, float], time_s: float) -> None:
+    def advance(self, n: Numbers, blows: Array, shares: Array, time_s: float) -> None:
         """Advance by one tick: motors and gears five times as often as Bullet."""
         x, y, turn = self.pose(time_s)
         velocity, rates = pybullet.getBaseVelocity(self._body.robot, physicsClientId=self._client)
-        shares, tick_s = np.array(duties), TICK_S / _STEPS / _DRIVE_STEPS
+        tick_s = TICK_S / _STEPS / _DRIVE_STEPS
         self._surround(n, x, y)
         brakes, push = self._brakes(n, x, y, turn), (0.0, 0.0, 0.0)
         if n.frame_rub > 0.0:
@@ -218,12 +221,14 @@ class _Robot:
     def _surround(self, n: Numbers, x: float, y: float) -> None:
         """Set what depends on the place: the floor's slope and the tyres' grip."""
         hidden, memory = self._hidden, self._memory
-        if hidden.waves is not None:
-            slope, length, phase_x, phase_y = hidden.waves
+        if hidden.waves is not None or hidden.curl is not None:
+            slope, length, phase_x, phase_y = hidden.waves or (0.0, 1.0, 0.0, 0.0)
             wave = 2.0 * math.pi / length
+            curl_x = n.curl * chassis.curled(x, FIELD[0], n.curl_width)
+            curl_y = n.curl * chassis.curled(y, FIELD[1], n.curl_width)
             self._lean(
-                hidden.tilt[0] + slope * math.sin(wave * x + phase_x),
-                hidden.tilt[1] + slope * math.sin(wave * y + phase_y),
+                hidden.tilt[0] + slope * math.sin(wave * x + phase_x) + curl_x,
+                hidden.tilt[1] + slope * math.sin(wave * y + phase_y) + curl_y,
             )
         if hidden.rocking is not None:
             slope, _, way, _ = hidden.rocking

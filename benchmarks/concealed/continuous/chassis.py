@@ -74,7 +74,7 @@ def advance(
     b, d
         States of body and drive, changed in place.
     duties
-        Signed shares of the terminal voltage in each tick (ticks, 2).
+        What :func:`benchmarks.concealed.continuous.drive.step_drive` takes, in each tick (ticks, 3).
     gusts
         Rows of start, length [s], force x, y [N].
     time_s, tick_s
@@ -116,7 +116,7 @@ def _step_body(
     force_ahead, force_left, torque = 0.0, 0.0, 0.0
     for side in range(2):
         lever = n.half_track if side == 0 else -n.half_track
-        radius, rise = _shape(n, side, b[WHEEL + side])
+        radius, rise = _shape(n, side, b[WHEEL + side], time_s)
         rolling = ahead - b[RATE] * lever
         toe = n.toe if n.toe_side == side else 0.0
         slip_x, slip_y = turned(rolling, left - b[RATE] * n.com_ahead, -toe)
@@ -177,11 +177,24 @@ def _slope(n: Numbers, b: npt.NDArray[np.float64], x: float, y: float, dt: float
         wave = 2.0 * math.pi / n.wave_length
         along_x += n.wave * math.sin(wave * x + n.wave_x)
         along_y += n.wave * math.sin(wave * y + n.wave_y)
+    if n.curl > 0.0:
+        along_x += n.curl * curled(x, 2.0 * _MIDDLE_X, n.curl_width)
+        along_y += n.curl * curled(y, 2.0 * _MIDDLE_Y, n.curl_width)
     if n.rocking > 0.0:
         leaning = n.rocking * tip(n, b, x, y, dt)
         along_x += leaning * math.cos(n.rocking_way)
         along_y += leaning * math.sin(n.rocking_way)
     return along_x, along_y
+
+
+@numba.njit(cache=True)
+def curled(place: float, length: float, wide: float) -> float:
+    """Give the share of its edges' slope that a curled mat has here, down to the middle."""
+    if place < wide:
+        return min(1.0 - place / wide, 1.0)
+    if length - place < wide:
+        return -min(1.0 - (length - place) / wide, 1.0)
+    return 0.0
 
 
 @numba.njit(cache=True)
@@ -286,6 +299,19 @@ def _drag_caster(
 
 
 @numba.njit(cache=True)
+def _sweep(n: Numbers, turn: float, vx: float, vy: float, rate: float) -> tuple[float, float, float]:
+    """Give the drag of a brush beside the robot [N], and its torque about the centre of mass [N m]."""
+    if n.brush == 0.0:
+        return 0.0, 0.0, 0.0
+    ahead, left = turned(vx, vy, -turn)
+    ahead, left = ahead - rate * n.brush_left, left + rate * n.brush_ahead
+    speed = math.hypot(ahead, left)
+    drag = -n.brush * (math.tanh(speed / _DRAG_BLEND) / speed if speed > 1e-9 else 1.0 / _DRAG_BLEND)
+    force_x, force_y = turned(drag * ahead, drag * left, turn)
+    return force_x, force_y, (n.brush_ahead - n.com_ahead) * drag * left - n.brush_left * drag * ahead
+
+
+@numba.njit(cache=True)
 def _haul(
     n: Numbers, b: npt.NDArray[np.float64], x: float, y: float, turn: float, dt: float
 ) -> tuple[float, float, float]:
@@ -335,9 +361,11 @@ def _share_load(
 
 
 @numba.njit(cache=True)
-def _shape(n: Numbers, side: int, angle: float) -> tuple[float, float]:
+def _shape(n: Numbers, side: int, angle: float, time_s: float) -> tuple[float, float]:
     """Height of the axle above the floor [m], and how it grows as the wheel turns [m/rad]."""
     radius = n.radius_left if side == 0 else n.radius_right
+    if n.leak > 0.0 and n.leak_side == side:
+        radius -= radius * n.leak * (1.0 - math.exp(-time_s / n.leak_time))
     if n.off_centre > 0.0:
         at = angle + (n.off_left if side == 0 else n.off_right)
         return radius + n.off_centre * math.sin(at), n.off_centre * math.cos(at)
@@ -437,7 +465,7 @@ def pushes(
     time_s: float,
     dt: float,
 ) -> tuple[float, float, float]:
-    """Force [N] at, and torque [N m] about, the centre of mass from cables, magnets, air, pile, scrub and a weight.
+    """Force [N] at, and torque [N m] about, the centre of mass from all that pushes but the contacts.
 
     Parameters
     ----------
@@ -494,6 +522,9 @@ def pushes(
     if n.fan > 0.0:
         blow_x, blow_y = _blow(n, x, y, time_s)
         force_x, force_y = force_x + blow_x, force_y + blow_y
+    torque += n.turret * math.sin(2.0 * math.pi * time_s / n.turret_period + n.turret_phase)
+    sweep_x, sweep_y, sweeping = _sweep(n, turn, vx, vy, rate)
+    force_x, force_y, torque = force_x + sweep_x, force_y + sweep_y, torque + sweeping
     if n.trailer > 0.0:
         haul_x, haul_y, hauling = _haul(n, b, x, y, turn, dt)
         force_x, force_y, torque = force_x + haul_x, force_y + haul_y, torque + hauling

@@ -15,9 +15,10 @@ from benchmarks.concealed.continuous.numbers import Numbers
 # then angles at which motors were stopped [rad], share of a grease's stiffness that is left, less one, voltage of a
 # worn battery's slow part [V], and how warm the motors' fuses are, against what their rated current makes of them;
 # then for how long drivers have borne too much current, and until when they are off [s], and how far wheels slipped
-# on their axles [rad].
+# on their axles [rad]; then how far the left motor was ahead when both were given the same [rad], and
+# whether they are.
 CURRENT, SPEED, ANGLE, BRISTLE, SLOW, TERMINAL, KEPT = 0, 2, 4, 6, 8, 9, 10
-HELD, GREASE, SAGGED, WARM, BORNE, OFF, SLIPPED, SIZE = 12, 14, 15, 16, 18, 20, 22, 24
+HELD, GREASE, SAGGED, WARM, BORNE, OFF, SLIPPED, LED, ALIKE, SIZE = 12, 14, 15, 16, 18, 20, 22, 24, 25, 26
 
 # Gears and axle twist by 1.4 degrees under a newton metre, 0.1 degree in a hard start: felt by nobody, and never rigid.
 GEAR_STIFFNESS = 40.0  # N m / rad
@@ -35,6 +36,7 @@ _BAND_SLIPS = 10.0  # rad
 _DRAG_BLEND = 0.2  # rad / s
 _RUB_BLEND = 0.5  # rad / s
 _GREASE_BLEND = 0.3  # rad / s
+_MOST_SYNCED = 0.3  # share of the supply
 _MOST_HELD = 0.8  # share of the supply, the duty cap
 
 
@@ -58,7 +60,7 @@ def step_drive(
     d
         State, changed in place.
     duties
-        Signed shares of the terminal voltage (2,).
+        Signed shares of the terminal voltage, and whether both motors are given the same, but not 0 (3,).
     wheel_angles, wheel_speeds
         Of the wheels, behind the gears (2,) [rad, rad/s].
     time_s
@@ -69,6 +71,8 @@ def step_drive(
         Receives the gears' torques on the wheels (2,) [N m].
     """
     left, right = _keep(n, d, 0, duties[0], dt), _keep(n, d, 1, duties[1], dt)
+    if n.sync > 0.0:
+        left, right = _together(n, d, left, right, duties[2])
     if n.holding > 0.0:
         left, right = _hold(n, d, 0, left), _hold(n, d, 1, right)
     drawn = left * d[CURRENT] + right * d[CURRENT + 1]
@@ -150,6 +154,20 @@ def _keep(n: Numbers, d: npt.NDArray[np.float64], side: int, duty: float, dt: fl
 
 
 @numba.njit(cache=True)
+def _together(
+    n: Numbers, d: npt.NDArray[np.float64], left: float, right: float, alike: float
+) -> tuple[float, float]:
+    """Remember how two motors stand when first given the same; give duties that keep them so."""
+    ahead = d[ANGLE] - d[ANGLE + 1]
+    if alike == 0.0 or d[ALIKE] == 0.0:
+        d[ALIKE], d[LED] = alike, ahead
+        return left, right
+    most = 2.0 * _MOST_SYNCED
+    fix = min(max(n.sync * (ahead - d[LED]), -most), most) / 2.0
+    return min(max(left - fix, -1.0), 1.0), min(max(right + fix, -1.0), 1.0)
+
+
+@numba.njit(cache=True)
 def _hold(n: Numbers, d: npt.NDArray[np.float64], side: int, duty: float) -> float:
     """Remember where a motor is while it is driven; give the duty that brings it back there when it is not."""
     if duty != 0.0:
@@ -214,6 +232,8 @@ def _motor(
     d[CURRENT + side] = current
     if duty == 0.0:
         current *= 1.0 - n.coasting
+    elif duty * current < 0.0:
+        current *= 1.0 - n.overrun
     torque = n.torque_constant * current
     if n.gear_loss > 0.0 and n.gear_loss_side == side:
         torque -= n.gear_loss * abs(torque) * math.tanh(speed / _DRAG_BLEND)

@@ -11,7 +11,9 @@ from benchmarks.concealed.robot import DUTY_CAP, KNOT_S, Concealed
 
 
 class Firmware:
-    """Throttle, delay, ramp, pause, rounding, cap, bend, dead band and what wanders, in this order, once a tick.
+    """All that changes a command before it drives a motor, once a tick: from what is heard to what wanders.
+
+    In the order of the code; ``alike`` says whether both motors are given the same duty, other than 0.
 
     Parameters
     ----------
@@ -28,6 +30,8 @@ class Firmware:
         self._asked: list[list[float]] = [[0.0, 0.0], [0.0, 0.0]]  # by motor: duty [%], and when it came [s]
         # By motor: the way it was driven last, and when that ended.
         self._last: list[tuple[float, float]] = [(0.0, -math.inf)] * 2
+        self._acting = [0.0, 0.0]  # duties from which others must differ enough to act [%]
+        self.alike = False
         self._known: dict[tuple[float, float], tuple[float, float]] = {}
 
     def duties(self, command_pct: tuple[float, float], time_s: float) -> tuple[float, float]:
@@ -50,6 +54,8 @@ class Firmware:
         heard = (0.0, 0.0) if lost else command_pct
         if hidden.latch is not None:
             heard = self._latched(heard, time_s, *hidden.latch)
+        if hidden.sticky_pct > 0.0:
+            heard = self._kept(heard, hidden.sticky_pct)
         self._issued.append(
             heard if hidden.throttle is None else self._spared(heard, time_s, *hidden.throttle)
         )
@@ -62,6 +68,7 @@ class Firmware:
             acting = (self._now[0], self._now[1])
         if hidden.reversal_pause > 0.0:
             acting = self._rested(0, acting[0], time_s), self._rested(1, acting[1], time_s)
+        self.alike = acting[0] == acting[1] != 0.0
         if acting not in self._known:
             self._known[acting] = self._bridged(*acting)
         shares = self._known[acting]
@@ -71,6 +78,13 @@ class Firmware:
         gains = [1.0, 1.0]
         gains[side] += float(np.interp(time_s, KNOT_S * np.arange(len(knots)), knots))
         return shares[0] * gains[0], shares[1] * gains[1]
+
+    def _kept(self, heard: tuple[float, float], least: float) -> tuple[float, float]:
+        """Keep to the duties that act until one is 0, or differs by enough."""
+        for side, duty in enumerate(heard):
+            if duty == 0.0 or abs(duty - self._acting[side]) >= least:
+                self._acting[side] = duty
+        return self._acting[0], self._acting[1]
 
     def _spared(
         self, heard: tuple[float, float], time_s: float, share: float, after: float
@@ -105,6 +119,9 @@ class Firmware:
     def _bridged(self, left_pct: float, right_pct: float) -> tuple[float, float]:
         """Give both motors' shares of the voltage."""
         left, right = self._bridge(left_pct), self._bridge(right_pct)
+        asked = abs(left) + abs(right)
+        if asked > self._hidden.duty_budget:
+            left, right = left * self._hidden.duty_budget / asked, right * self._hidden.duty_budget / asked
         keep = 1.0 - self._hidden.shared_drop if left != 0.0 and right != 0.0 else 1.0
         differ = self._hidden.gain_difference / 2.0
         return left * keep * (1.0 - differ), right * keep * (1.0 + differ)

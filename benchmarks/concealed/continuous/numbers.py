@@ -167,6 +167,19 @@ class Numbers(NamedTuple):
     fin_way: float
     nap: float
     nap_way: float
+    overrun: float
+    sync: float
+    brush: float
+    brush_ahead: float
+    brush_left: float
+    curl: float
+    curl_width: float
+    leak: float
+    leak_time: float
+    leak_side: float
+    turret: float
+    turret_period: float
+    turret_phase: float
 
 
 def numbers(concealed: Concealed) -> Numbers:
@@ -211,6 +224,8 @@ def numbers(concealed: Concealed) -> Numbers:
         clutches[concealed.clutch[1]] = concealed.clutch[0]
     cut_out, fin = concealed.cut_out or (math.inf, 0.0, 0.0), concealed.fin or (0.0, 0.0)
     nap, pulses = concealed.nap or (0.0, 0.0), concealed.pulses or (0.0, 1.0, 0.0, 0.0)
+    brush, curl = concealed.brush or (0.0, 0.0, 0.0), concealed.curl or (0.0, 1.0)
+    leak, turret = concealed.leak or (0.0, 1.0, 0), concealed.turret or (0.0, 1.0, 0.0)
     fields = {
         "mass": base.mass,
         "yaw_inertia": base.yaw_inertia * concealed.yaw_inertia_scale,
@@ -361,6 +376,19 @@ def numbers(concealed: Concealed) -> Numbers:
         "fin_way": fin[1],
         "nap": nap[0],
         "nap_way": nap[1],
+        "overrun": concealed.overrun,
+        "sync": concealed.motor_sync,
+        "brush": brush[0],
+        "brush_ahead": brush[1],
+        "brush_left": brush[2],
+        "curl": curl[0],
+        "curl_width": curl[1],
+        "leak": leak[0],
+        "leak_time": leak[1],
+        "leak_side": leak[2],
+        "turret": turret[0],
+        "turret_period": turret[1],
+        "turret_phase": turret[2],
     }
     return Numbers(**{name: float(number) for name, number in fields.items()})
 

@@ -41,7 +41,7 @@ class Truth:
         """Drive from rest, as `benchmarks.concealed.worlds.Truth.run`."""
         count = round(seconds / TICK_S) + 1
         noise = np.zeros(count) if reading_noise is None else reading_noise
-        log, seen, shares = History.blank(count), np.zeros((count + turn_ticks, 7)), np.zeros((turn_ticks, 2))
+        log, seen, shares = History.blank(count), np.zeros((count + turn_ticks, 7)), np.zeros((turn_ticks, 3))
         n, body, train = self._numbers, chassis.start(self._numbers, *start), np.zeros(drive.SIZE)
         firmware, sensor = Firmware(self.concealed), ColourSensor(self.concealed)
         train[drive.TERMINAL] = n.supply
@@ -59,7 +59,8 @@ class Truth:
                 return _filled(log, seen).until(tick + 1)
             log.commands[tick : tick + turn_ticks] = command
             for k in range(turn_ticks):
-                shares[k] = firmware.duties(command, time_s + k * TICK_S)
+                shares[k, :2] = firmware.duties(command, time_s + k * TICK_S)
+                shares[k, 2] = firmware.alike
             after = seen[tick + 1 : tick + 1 + turn_ticks]
             chassis.advance(n, body, train, shares, self._gusts, time_s, TICK_S, step, after)
             if body[chassis.LIFTED] > _FALLEN_S:

@@ -6,10 +6,11 @@ from benchmarks.concealed.kinds.final import FINAL
 from benchmarks.concealed.kinds.fresh import FRESH
 from benchmarks.concealed.kinds.outside import OUTSIDE, Outside
 from benchmarks.concealed.kinds.sealed import SEALED
+from benchmarks.concealed.kinds.seventh import SEVENTH
 from benchmarks.concealed.kinds.sixth import SIXTH
 from benchmarks.concealed.kinds.unmet import UNMET
 
-ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET, **FRESH, **SIXTH}
+ALL_OUTSIDE: dict[str, Outside] = {**OUTSIDE, **SEALED, **FINAL, **UNMET, **FRESH, **SIXTH, **SEVENTH}
 
 MET = "met"
 _KNOWN = {name: kind for name, kind in SEALED.items() if not kind.last}
@@ -21,4 +22,5 @@ SETS: dict[str, dict[str, Outside]] = {
     "unmet": UNMET,
     "fresh": FRESH,
     "sixth": SIXTH,
+    "seventh": SEVENTH,
 }
