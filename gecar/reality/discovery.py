@@ -76,7 +76,9 @@ Spans = Mapping[str, Mapping[str, Interval]]
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
 FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wheels left 0.4
-INSTEAD = 0.7  # laws in the place of effects must leave so much less, or explain so much more, than laws beside them
+# Laws in the place of effects must leave so much less, or explain so much more, than laws beside them; and laws where
+# nothing material is left must leave so much less than there was.
+INSTEAD = 0.7
 
 
 @dataclass(frozen=True)
@@ -402,7 +404,7 @@ def _with_laws(context: _Context, stage: _Stage) -> _Stage:
         return stage
     beside = _with_laws_on(context, context.language, stage, stage.explained)
     of_any_size = context.invents or stage.explained.unexplained
-    if not (of_any_size or _is_material(beside, stage)):
+    if not of_any_size and not (_is_material(beside, stage) and _left(beside) < INSTEAD * _left(stage)):
         beside = stage
     if not _is_left(beside):
         return beside

@@ -360,6 +360,9 @@ def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkey
     with monkeypatch.context() as patched:  # as if effects' own laws were off by as much
         patched.setattr(discovery, "left_share", lambda _: 1.0)
         assert with_oval_wheels(0.02).invented == ()
+    with monkeypatch.context() as patched:  # as if they left most of what there was
+        patched.setattr(discovery, "INSTEAD", 0.0)
+        assert with_oval_wheels(0.02).invented == ()
     monkeypatch.setattr(selection_problem, "STANDING_OUT", np.inf)
     assert with_oval_wheels(0.02).invented == ()
 
