@@ -130,8 +130,8 @@ def _in_a_valley(model: Model, slopes: Array) -> list[bool]:
 
 def alike(covariance: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.bool_]:
     """Return which estimates are correlated by more than `ALIKE`, each with itself too, shape (k, k)."""
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    out: npt.NDArray[np.bool_] = np.abs(covariance / np.outer(deviation, deviation)) > ALIKE
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    out: npt.NDArray[np.bool_] = np.abs(covariance) > ALIKE * np.outer(deviation, deviation)
     return out
 
 
