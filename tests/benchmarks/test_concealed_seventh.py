@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,20 +11,28 @@ pytest.importorskip(
     "mujoco", reason="MUJOCO IS MISSING: the seventh kinds are not tested (pip install gecar[test])"
 )
 
-from support.concealed_worlds import HERE, assert_felt_alike, changes, driven, label_of
+from support.concealed_worlds import (
+    HERE,
+    assert_drawn_alone,
+    assert_felt_alike,
+    assert_material,
+    assert_nothing,
+    changes,
+    crossed,
+    driven,
+    label_of,
+)
 
-from benchmarks.concealed.cases import Manner, unlike_neutral
+from benchmarks.concealed.cases import unlike_neutral
 from benchmarks.concealed.colour_sensor import ColourSensor
 from benchmarks.concealed.effects import Exactly
 from benchmarks.concealed.history import History
 from benchmarks.concealed.kinds.seventh import SEVENTH
-from benchmarks.concealed.plan import outside_kinds
 from benchmarks.concealed.recording import channels
-from benchmarks.concealed.rehearsal import along, stacked
 from benchmarks.concealed.robot import NEUTRAL, Concealed
-from benchmarks.concealed.sizes import is_material, size
 from benchmarks.concealed.worlds import holds, truth
 
+START = (0.6, 0.13, 0.2)  # of the way across the lower line
 LEFT, RIGHT = 0, 1
 LESS, MORE = -1, 1
 AHEAD, TURNED = 0, 2  # of the pose
@@ -65,13 +72,7 @@ def in_mujoco():
 @pytest.fixture(scope="module", params=HERE)
 def crossing(request):
     """A world, and what the nominal robot does there as it weaves across the lower line for over a metre."""
-    return request.param, crossed(request.param, NEUTRAL)
-
-
-def crossed(world, robot):
-    held = ((60, 75), (75, 45), (0, 0), (75, 75), (45, 75), (75, 50), (-30, 30), (75, 45), (60, 60))
-    start = (0.6, 0.13, 0.2)
-    return truth(world, robot).run(start, lambda time_s, _: held[min(int(time_s / 0.5), 8)], 4.5)
+    return request.param, crossed(request.param, NEUTRAL, START)
 
 
 def robot_at(name, share):
@@ -85,10 +86,8 @@ def test_at_the_upper_strength_each_kind_is_material(crossing, name):
     robot = robot_at(name, 1.0)
     if not holds(world, unlike_neutral(robot)):
         pytest.skip(f"the {world} world has no law for it")
-    moved = nominal if STILL & set(unlike_neutral(robot)) else crossed(world, robot)
-    moved = replace(moved, light=along(nominal, robot))  # motion and sensor apart
-    sizes = size([(stacked(channels(moved, robot)), stacked(channels(nominal, NEUTRAL)))])
-    assert is_material(sizes), sizes
+    moved = nominal if STILL & set(unlike_neutral(robot)) else crossed(world, robot, START)
+    assert_material(nominal, moved, robot)
 
 
 @pytest.mark.parametrize("world", HERE)
@@ -99,14 +98,7 @@ def test_each_thing_concealed_moves_the_robot_as_it_should_and_as_far_as_elsewhe
 
 @pytest.mark.parametrize("world", HERE)
 def test_at_no_strength_each_thing_leaves_a_recording_as_it_is(world):
-    def recorded(robot):
-        history = truth(world, robot).run((0.175, 0.6, 1.5), lambda time_s, _: (60, 20), 0.3)
-        return stacked(channels(history, robot))
-
-    nominal = recorded(NEUTRAL)
-    for field, nothing in NOTHING.items():
-        if holds(world, [field]):
-            np.testing.assert_array_equal(recorded(Concealed(**{field: nothing})), nominal, err_msg=field)
+    assert_nothing(world, NOTHING)
 
 
 @pytest.mark.parametrize("world", HERE)
@@ -269,13 +261,7 @@ def test_only_what_swings_by_the_clock_differs_from_run_to_run():
 
 def test_seventh_kinds_are_drawn_alone_or_not_at_all():
     assert len(SEVENTH) >= 12
-    for world, least in (("continuous", 12), ("mujoco", 12), ("bullet", 11)):
-        manner = Manner(world, background=True)
-        drawable = outside_kinds(manner, "seventh")
-        assert len(drawable) >= least
-        assert set(drawable) <= set(SEVENTH)
-        for kinds in ("met", "last", "final", "unmet", "fresh", "sixth"):
-            assert not set(SEVENTH) & set(outside_kinds(manner, kinds))
+    assert_drawn_alone("seventh", {"continuous": 12, "mujoco": 12, "bullet": 11})
 
 
 def test_a_label_says_which_kind_and_how_strong(tmp_path, monkeypatch):

@@ -3,13 +3,20 @@
 import importlib.util
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from benchmarks.concealed import cases
+from benchmarks.concealed.kinds import SETS
+from benchmarks.concealed.plan import outside_kinds
+from benchmarks.concealed.recording import channels
+from benchmarks.concealed.rehearsal import along, stacked
 from benchmarks.concealed.robot import EV3, NEUTRAL, Concealed
 from benchmarks.concealed.settings import Setting
-from benchmarks.concealed.worlds import WORLDS, truth
+from benchmarks.concealed.sizes import is_material, size
+from benchmarks.concealed.worlds import WORLDS, holds, truth
 
 HERE = [
     pytest.param(
@@ -47,6 +54,44 @@ def assert_felt_alike(world, felt, elsewhere):
         assert abs(here[part]) > 1e-3, fields
         assert math.copysign(1.0, here[part]) == wanted, fields
         assert here[part] == pytest.approx(there[part], rel=0.15), fields
+
+
+def crossed(world, robot, start):
+    """Weave across the lower line for more than a metre."""
+    held = ((60, 75), (75, 45), (0, 0), (75, 75), (45, 75), (75, 50), (-30, 30), (75, 45), (60, 60))
+    return truth(world, robot).run(start, lambda time_s, _: held[min(int(time_s / 0.5), 8)], 4.5)
+
+
+def assert_material(nominal, moved, robot):
+    """A robot must move, or read, materially otherwise than the nominal one, motion and sensor apart."""
+    moved = replace(moved, light=along(nominal, robot))
+    sizes = size([(stacked(channels(moved, robot)), stacked(channels(nominal, NEUTRAL)))])
+    assert is_material(sizes), sizes
+
+
+def assert_nothing(world, nothing):
+    """At no strength each thing, by field, must leave a recording as it is."""
+
+    def recorded(robot):
+        history = truth(world, robot).run((0.175, 0.6, 1.5), lambda time_s, _: (60, 20), 0.3)
+        return stacked(channels(history, robot))
+
+    nominal = recorded(NEUTRAL)
+    for field, none in nothing.items():
+        if holds(world, [field]):
+            np.testing.assert_array_equal(recorded(Concealed(**{field: none})), nominal, err_msg=field)
+
+
+def assert_drawn_alone(name, least):
+    """Kinds of a set are drawn with no others, and by no set before; ``least``: how many of them by world."""
+    before = list(SETS)[: list(SETS).index(name)]
+    for world, count in least.items():
+        manner = cases.Manner(world, background=True)
+        drawable = outside_kinds(manner, name)
+        assert len(drawable) >= count
+        assert set(drawable) <= set(SETS[name])
+        for kinds in before:
+            assert not set(SETS[name]) & set(outside_kinds(manner, kinds))
 
 
 def label_of(kind, folder, monkeypatch):
