@@ -355,11 +355,13 @@ def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
     """Return other chains: from runners-up where the first took several effects, from halves of pairs where none.
 
-    Where it took none, what fits best may be stopped by a bound, or make whole drives worse, for it stands in for two;
-    they then leave no more than is material: what imitates is stopped by bounds, too.
+    Where it took none, and leaves more than is material, what fits best may be stopped by a bound, or make whole drives
+    worse, for it stands in for two; they then leave no more than is material: what imitates is stopped by bounds, too.
     """
     firsts = competing(first)[:BEGINNINGS]
     if not chain.steps:
+        if not _leaves_much(problem, problem.known):
+            return []
         pairs = (_beginning_with(problem, first, step) for step in firsts)
         return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
     if len(chain.steps) < 2:
