@@ -36,11 +36,11 @@ Single = npt.NDArray[np.float32]
 
 ROUNDS = 3  # of weights and ratios, each from what the others leave
 CLIP = 30.0  # standard deviations
-FEW = 6  # rows
+FEW = 6  # rows, up to which a product for each takes less time than one for all
 
 
 class _Shrinking(NamedTuple):
-    """What small changes make of weighted residuals: by how much each coordinate in a basis, (k, n), shrinks, (k,).
+    """Vectors, shape (k, n), along which whitening shrinks weighted residuals, and by what share, shape (k,).
 
     In single precision, which is twice as fast: a good part of the time of all fits is spent here.
     """
@@ -104,7 +104,6 @@ class Discrepancy:
     def _whitened(self, errors: Array, shrinking: _Shrinking) -> Array:
         scaled: Array = errors * self.scale
         rows = scaled.reshape(-1, scaled.shape[-1])
-        # A product of few rows takes longer than as many products of one.
         for part in rows if len(rows) <= FEW else [rows]:
             np.subtract(part, shrinking.subtracted(part, self.root_weight), out=part)
         return scaled

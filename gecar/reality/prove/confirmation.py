@@ -170,7 +170,7 @@ def _shown(explained: Explanation, without: Model) -> Array:
 
 
 def _is_missed(step: Step, share: Share) -> bool:
-    """Whether an effect is a place, all of which recordings ask for: a drive slightly off its path misses it."""
+    """Whether an effect is at a place, and recordings ask for all of it: a drive off its path may miss the place."""
     return BY_ID[step.effect].at_a_place and share.is_whole
 
 

@@ -146,19 +146,19 @@ def shares_of_groups(
     return asked[known] / information[known], information[known]
 
 
-def sums_of_spans(index: ResidualIndex, values: Array) -> dict[int, Array]:
-    """Return the sums of values, one of each residual, over each recording's spans of `SPAN_S`, by its number."""
-    sums = dict[int, Array]()
+def _sums_of_spans(index: ResidualIndex, values: Array) -> list[Array]:
+    """Return the sums of values, one of each residual, over spans of `SPAN_S`, of each recording."""
+    sums = []
     for number in np.unique(index.recording):
         own = index.recording == number
         span = (index.t_s[own] / SPAN_S).astype(int)
-        sums[int(number)] = np.bincount(span, values[own]).astype(float)
+        sums.append(np.bincount(span, values[own]).astype(float))
     return sums
 
 
 def _variance_of_sum(index: ResidualIndex, scores: Array) -> tuple[float, float]:
     """Return the variance of the scores' sum, and how many spans would have it were they independent."""
-    series = list(sums_of_spans(index, scores).values())
+    series = _sums_of_spans(index, scores)
     alone = sum(float(s @ s) for s in series)
     variance = alone
     for lag in range(1, max(len(s) for s in series)):
