@@ -205,7 +205,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     candidates = [step for stage in stages for step in stage.candidates]
     nothing = not (effects or invented)
     shows = nothing or len(unseen) < len(effects) or any(law.shows for law in invented)
-    where = _located(context, stages, fitted, found)
+    where = _located(context, stages, fitted, after.held, found)
     seen_from = _limits(context, stages)
     return Verdict(
         case=name,
@@ -561,19 +561,27 @@ def _limits(context: _Context, stages: Sequence[_Stage]) -> dict[str, Limit | No
     return {effect.id: seen.get(effect.id) for effect in context.catalogue if effect.id not in found}
 
 
-def _located(context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Robot) -> MismatchMap:
-    """Return where simulation and reality part."""
-    motion = stages[0].explained
+def _located(
+    context: _Context, stages: Sequence[_Stage], fitted: Residuals, held: Residuals, found: Robot
+) -> MismatchMap:
+    """Return where simulation and reality part, in all recordings: nothing is fitted to them here.
+
+    The last part of an only recording stays set aside, and so do recordings with an instrument that was left out.
+    """
+    motion, runs = stages[0].explained, fitted.recordings
+    if not (context.split.by_time or stages[0].left_out):
+        runs += held.recordings
+    shown = replace(fitted, recordings=runs)
     sensor_unexplained = any(stage.explained.unexplained for stage in stages[1:])
     return MismatchMap(
-        fitted.recordings,
-        motion.problem.residuals.errors(context.robot.physics),
-        motion.problem.residuals.index,
+        shown.recordings,
+        shown.errors(context.robot.physics),
+        shown.index,
         context.robot.physics,
         motion.taken.physics,
         found.physics,
         (not motion.unexplained, not sensor_unexplained),
-        sensor_unexplained and path_in_doubt(fitted.recordings, found.physics),
+        sensor_unexplained and path_in_doubt(shown.recordings, found.physics),
         motion.spot,
     )
 

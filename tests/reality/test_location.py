@@ -81,6 +81,14 @@ def test_what_is_pointed_at_first_is_the_loudest_sensor_and_its_loudest_spans() 
     assert where.stretch_energy[0, of, spans].min() >= where.stretch_energy[0, of, ~spans].max()
 
 
+def test_a_recording_set_aside_is_pointed_at_where_it_shows_most() -> None:
+    robot = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.003}})
+    calm = (recorded(robot, seed, most=3) for seed in range(3))
+    verdict = discover(Case("made", (*calm, recorded(robot, 3, most=9))), ["run_3"])
+    assert [f.id for f in verdict.effects] == ["viscous_friction"]
+    assert verdict.located[0].recording == "run_3"
+
+
 @pytest.mark.parametrize("missing", [(), ("left_angle_rad", "right_angle_rad")])
 def test_a_ripple_is_found_whatever_the_phases_of_the_two_motors(missing: tuple[str, ...]) -> None:
     phases = {"phase_rad": -1.55, "right_lead_rad": 0.47}
