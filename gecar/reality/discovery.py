@@ -188,6 +188,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     fitted = _along_paths(
         motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
     )
+    # Where a drive began is told once, or robots would be judged on other readings each.
+    held = _with_nuisances(held, motion.explained, motion.explained.taken.physics)
     sensing = _explain_sensor(context, motion.explained, fitted, held)
     stages = [stage for stage in (motion, sensing) if stage]
     found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
@@ -363,7 +365,7 @@ def _explain_sensor(
         context = replace(context, catalogue=known_place, language=language)
     # A late camera and a skewed clock shift what is read, too.
     known = motion.taken.parameters.robot.with_effects(motion.taken.values)
-    beside = _with_nuisances(held, motion, motion.taken.physics).of_sensor()
+    beside = held.of_sensor()
     problem = _problem(context, known, residuals, beside)
     problem = replace(problem, sizes=replace(problem.sizes, off=motion.left))
     seen = explained_and_confirmed(problem, beside)

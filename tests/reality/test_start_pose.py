@@ -79,6 +79,28 @@ def test_dead_reckoning_with_wrong_wheels_is_seen_through(wheels: tuple[float, f
     assert found is None
 
 
+@pytest.mark.parametrize("source", [ARRIVES, SPINS])
+def test_a_start_is_found_though_the_sensor_is_mounted_elsewhere_and_late(source: str) -> None:
+    elsewhere = EV3.with_effects({"sensor_position": {"ahead_m": 0.1, "left_m": 0.015}})
+    run = trial("made", elsewhere, source, posed=False)
+    late = replace(run, reflection_pct=np.interp(run.t_s - 0.05, run.t_s, run.reflection_pct))
+    found = whereabouts(late)
+    assert found is not None
+    assert np.abs(found - START)[:2].max() < 0.003
+    assert abs(found[2] - START[2]) < math.radians(0.5)
+
+
+def test_two_robots_are_judged_from_one_start() -> None:
+    runs = (replace(run, reflection_pct=np.round(0.9 * run.reflection_pct)) for run in blind(EV3).recordings)
+    verdict = discover(Case("made", tuple(runs)))
+    assert [f.id for f in verdict.effects] == ["sensor_gain"]
+    starts = [
+        [run.nuisances.start for run in held.recordings]
+        for held in (verdict.evidence.held_before, verdict.evidence.held)
+    ]
+    assert np.array_equal(*starts)
+
+
 def test_other_wheels_stretch_a_path_and_a_new_start_carries_it() -> None:
     path = np.column_stack([np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)])
     longer = with_other_wheels(path, np.array([0.5, 0.0, 0.5 * math.pi, 0.1, 0.0, 0.0]))

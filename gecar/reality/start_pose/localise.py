@@ -7,6 +7,7 @@ sharper floors. A start counts where no other fits nearly as well, but those tha
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,19 +22,19 @@ from gecar.world.course.course import Course
 
 Array = npt.NDArray[np.float64]
 Physics = npt.NDArray[Any]
-Stages = tuple[tuple[float, int], ...]
+Stages = tuple[tuple[float, tuple[int, ...]], ...]
 
 ARC_M = 0.01  # what the sensor's path is sampled at
-# Spots a path is refined with [m], and how many changes of `with_other_wheels` are free: the start; wheels and track.
-SHARPER: Stages = ((FINE_SPOT_M, 3), (0.0, 3))
-WITH_WHEELS: Stages = ((0.03, 6), (FINE_SPOT_M, 6), (0.0, 6))
-# Scales of those changes in a fit.
-CHANGES = np.array([0.01, 0.01, 0.02, 0.01, 0.01, 0.05])
+# Scales of changes in a fit: those of `with_other_wheels`; the sensor's delay and lag [s], and where it is mounted [m].
+CHANGES = np.array([0.01, 0.01, 0.02, 0.01, 0.01, 0.05, 0.03, 0.03, 0.01, 0.01])
+START, WHEELS, SENSOR = (0, 1, 2), (3, 4, 5), (6, 7, 8, 9)
+# Spots a path is refined with [m], and which of the changes are free.
+SHARPER: Stages = ((FINE_SPOT_M, START), (0.0, START))
+WITH_WHEELS: Stages = tuple((spot, START + WHEELS) for spot in (0.03, FINE_SPOT_M, 0.0))
+WITH_SENSOR: Stages = tuple((spot, START + SENSOR) for spot in (0.03, FINE_SPOT_M, 0.0))
 PROBE, FARTHEST = 0.05, 5.0
-OTHER_WHEELS_GAIN, FITS_PCT = (
-    1.5,
-    3.0,
-)  # a misfit so many times smaller, and as small, with other wheels: they are other
+# A misfit so many times smaller, and as small, with other wheels: they are other; and so is the sensor.
+OTHER_GAIN, FITS_PCT = 1.5, 3.0
 LEAST_CONTRAST = 5.0  # standard deviation of readings along the path [%]: less has not crossed a line
 KNEE_PCT = 5.0  # misfits this large and larger count less than their squares
 # Standard deviations of a start pose that is found [m, m, rad].
@@ -88,22 +89,25 @@ def find_start(t: Array, path: Array, readings: Array, course: Course, physics: 
     readings_misfit = _ReadingMisfit(t, readings, course, physics)
     starts = likely_starts(points, seen, course, physics)
     found = sorted(
-        (readings_misfit.refined(starting_at(path, start)) for start in starts), key=lambda one: one[1]
+        (readings_misfit.refined(_Fit(starting_at(path, start))) for start in starts),
+        key=lambda fit: fit.cost,
     )
-    best, least = found[0]
+    found = readings_misfit.with_other_sensor(found)
+    best = found[0]
     if (readings_misfit.spread(best) > LEAST_KNOWN).any():
         return None
-    rivals = [other for other, misfit in found if misfit < RIVAL_COST * least]
+    rivals = [other for other in found if other.cost < RIVAL_COST * best.cost]
     for other in rivals[1:]:
-        if not near(best[0], other[0], SAME_M, SAME_RAD) and readings_misfit.differ(best, other) > SAME_PCT:
+        apart = not near(best.path[0], other.path[0], SAME_M, SAME_RAD)
+        if apart and readings_misfit.differ(best, other) > SAME_PCT:
             return None
     home = np.array([course.start.x_m, course.start.y_m])
-    nearest = min(rivals, key=lambda other: float(np.hypot(*(other[0, :2] - home))))
+    nearest = min(rivals, key=lambda other: float(np.hypot(*(other.path[0, :2] - home))))
     misfit = readings_misfit.typical(nearest)
-    others = readings_misfit.typical(readings_misfit.refined(nearest, WITH_WHEELS)[0])
-    if others < FITS_PCT and misfit > OTHER_WHEELS_GAIN * others:
+    others = readings_misfit.typical(readings_misfit.refined(nearest, WITH_WHEELS))
+    if others < FITS_PCT and misfit > OTHER_GAIN * others:
         return None
-    start: Array = nearest[0]
+    start: Array = nearest.path[0]
     return start
 
 
@@ -135,6 +139,20 @@ def bare_floor(t: Array, readings: Array, sd: float) -> npt.NDArray[np.bool_]:
     return even & ~np.isnan(readings)
 
 
+@dataclass(frozen=True)
+class _Fit:
+    """A path; the sensor's delay and lag [s], and how far ahead and left of its place it is [m]; the cost a reading."""
+
+    path: Array
+    sensor: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    cost: float = math.inf
+
+    def changed(self, change: Array) -> _Fit:
+        """Return this with other starts, wheels and sensors, by what is added to them, shape (10,)."""
+        delay, lag, ahead, left = (float(part) for part in self.sensor + change[6:])
+        return replace(self, path=with_other_wheels(self.path, change[:6]), sensor=(delay, lag, ahead, left))
+
+
 class _ReadingMisfit:
     """What a recording's sensor would have read along a path."""
 
@@ -143,50 +161,72 @@ class _ReadingMisfit:
         self._readings, self._there = readings, ~np.isnan(readings)
         self._raster, self._pitch = course.raster(course.pitch_m), course.pitch_m
 
-    def readings(self, path: Array, spot_m: float = 0.0) -> Array:
+    def readings(self, fit: _Fit, spot_m: float = 0.0) -> Array:
         physics = self._physics.copy()
         physics["spot_diameter"] = math.hypot(physics["spot_diameter"][0], spot_m)
+        delay, lag, ahead, left = fit.sensor
+        physics["sensor_lag"] = max(physics["sensor_lag"][0] + lag, 0.0)
+        physics["sensor_ahead"] += ahead
+        physics["sensor_left"] += left
         out = np.empty(len(self._t))
-        readings_along(self._t, path, 0.0, 1.0, self._raster, self._pitch, physics, np.zeros(3), out)
+        readings_along(self._t, fit.path, -delay, 1.0, self._raster, self._pitch, physics, np.zeros(3), out)
         return out
 
-    def errors(self, path: Array, spot_m: float = 0.0) -> Array:
-        out: Array = (self.readings(path, spot_m) - self._readings)[self._there] / (KNEE_PCT / KNEE)
+    def errors(self, fit: _Fit, spot_m: float = 0.0) -> Array:
+        out: Array = (self.readings(fit, spot_m) - self._readings)[self._there] / (KNEE_PCT / KNEE)
         return out
 
-    def refined(self, path: Array, stages: Stages = SHARPER) -> tuple[Array, float]:
-        """Return the path nearby that fits best, and its cost a reading."""
-        cost = math.inf
+    def refined(self, fit: _Fit, stages: Stages = SHARPER) -> _Fit:
+        """Return the fit nearby that is best."""
         for spot, free in stages:
+            at = list(free)
 
-            def change(z: Array, free: int = free) -> Array:
-                return np.r_[z, np.zeros(6 - free)] * CHANGES
+            def changed(z: Array, fit: _Fit = fit, at: list[int] = at) -> _Fit:
+                change = np.zeros(len(CHANGES))
+                change[at] = z * CHANGES[at]
+                return fit.changed(change)
 
-            def misfit(z: Array, path: Array = path, spot: float = spot, change: Any = change) -> Array:
-                return self.errors(with_other_wheels(path, change(z)), spot)
+            def misfit(z: Array, changed: Any = changed, spot: float = spot) -> Array:
+                return self.errors(changed(z), spot)
 
-            far = np.full(free, FARTHEST)
-            found = least_squares(row_by_row(misfit), np.zeros(free), (-far, far), np.full(free, PROBE))
-            path, cost = with_other_wheels(path, change(found.z)), found.cost / self._there.sum()
-        return path, cost
+            far = np.full(len(at), FARTHEST)
+            found = least_squares(row_by_row(misfit), np.zeros(len(at)), (-far, far), np.full(len(at), PROBE))
+            fit = replace(changed(found.z), cost=found.cost / self._there.sum())
+        return fit
 
-    def spread(self, path: Array) -> Array:
+    def with_other_sensor(self, found: list[_Fit]) -> list[_Fit]:
+        """Return fits, the best first; with a late sensor mounted elsewhere where one fits, and far better than none.
+
+        A sensor that is late sees no edge where it should be, so that no start fits well, nor far better than another.
+        """
+        least = self.typical(found[0])
+        if least < FITS_PCT:
+            return found
+        places = list[_Fit]()
+        for fit in found:
+            if not any(near(fit.path[0], other.path[0], SAME_M, SAME_RAD) for other in places):
+                places.append(fit)
+        other = sorted((self.refined(fit, WITH_SENSOR) for fit in places), key=lambda fit: fit.cost)
+        return other if min(least / OTHER_GAIN, KNEE_PCT) > self.typical(other[0]) else found
+
+    def spread(self, fit: _Fit) -> Array:
         """Return how uncertain a path's start is, shape (3,) [m, m, rad]; infinite along a line crossed once."""
         scale = 0.5 * LEAST_KNOWN
-        sides = np.diag(scale)
-        ends = [(starting_at(path, path[0] + side), starting_at(path, path[0] - side)) for side in sides]
-        slopes = np.stack([(self.errors(one) - self.errors(other)) / 2.0 for one, other in ends])
+        sides = np.pad(np.diag(scale), ((0, 0), (0, len(CHANGES) - len(scale))))
+        slopes = np.stack(
+            [(self.errors(fit.changed(side)) - self.errors(fit.changed(-side))) / 2.0 for side in sides]
+        )
         normal = slopes @ slopes.T
-        noise = np.mean(self.errors(path) ** 2) + (KNEE / KNEE_PCT) ** 2
+        noise = np.mean(self.errors(fit) ** 2) + (KNEE / KNEE_PCT) ** 2
         if np.linalg.cond(normal) > 1e9:
             return np.full(3, np.inf)
         out: Array = scale * np.sqrt(noise * CORRELATED * np.diag(np.linalg.inv(normal)))
         return out
 
-    def differ(self, one: Array, other: Array) -> float:
+    def differ(self, one: _Fit, other: _Fit) -> float:
         """Return how much readings along two paths differ on the mean [%]."""
         return float(np.mean(np.abs(self.readings(one) - self.readings(other))))
 
-    def typical(self, path: Array) -> float:
+    def typical(self, fit: _Fit) -> float:
         """Return the root mean square misfit of a reading [%]."""
-        return float(KNEE_PCT / KNEE * np.sqrt(np.mean(self.errors(path) ** 2)))
+        return float(KNEE_PCT / KNEE * np.sqrt(np.mean(self.errors(fit) ** 2)))
