@@ -16,7 +16,7 @@ from gecar.reality.materiality import Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
 from gecar.reality.prove import confirmation
-from gecar.reality.prove.confirmation import confirmed
+from gecar.reality.prove.confirmation import confirmed, dropped
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection import stepwise
@@ -28,7 +28,7 @@ from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import explain, resumed
-from gecar.reality.selection.thresholds import table
+from gecar.reality.selection.thresholds import PRICE, table
 from gecar.world.effects import BY_ID
 from gecar.world.rollout import STEP_S
 
@@ -295,12 +295,40 @@ def test_alternatives_come_from_the_stage_an_effect_was_taken_at() -> None:
         INERTIA: bumps(3, 4, 1.0) + 0.02 * bumps(7, 4, 1.0),
     }
     explained = explain(linear_problem(linear({VISCOUS: 9.0, TRACK: 6.0}, twins)))
-    second = explained.steps[1]
-    rest = explained.problem.estimator.fit((second.effect,), explained.taken.values)
-    dropped = replace(explained, steps=(second,), taken=rest)
+    left = dropped(explained, explained.steps[0])
+    (second,) = left.steps
     assert second.stage == 1
-    assert {s.effect for s in dropped.tried[second.stage]} >= {TRACK, INERTIA} - {second.effect}
-    assert set(alternatives(dropped, second)) | {second.effect} == {TRACK, INERTIA}
+    assert {s.effect for s in left.tried[second.stage]} >= {TRACK, INERTIA} - {second.effect}
+    assert set(alternatives(left, second)) | {second.effect} == {TRACK, INERTIA}
+
+
+def test_an_alternative_is_judged_by_what_it_would_leave() -> None:
+    twins = {VISCOUS: RESPONSES[VISCOUS], INERTIA: RESPONSES[VISCOUS] + 0.024 * RESPONSES[TRACK]}
+    explained = explain(linear_problem(linear({VISCOUS: 5.0}, twins)))
+    step, estimator = explained.steps[0], explained.problem.estimator
+    assert step.effect == VISCOUS
+    other = alternatives(explained, step)[INERTIA]
+    assert other.cost - explained.taken.cost > PRICE  # by what the effect leaves, which is less
+    beside = explained.problem.under(other)
+    assert beside.cost_of(other.physics) - beside.cost_of(explained.taken.physics) < PRICE
+    ratios = [e.discrepancy.ratios.max() for e in (beside.estimator, estimator) if e.discrepancy is not None]
+    assert ratios[0] > ratios[1]
+
+
+def test_alternatives_are_those_beside_what_is_left() -> None:
+    """What an effect was taken beside may be refused later: then its rivals are those without it."""
+    twins = {
+        VISCOUS: bumps(1, 4, 1.0),
+        TRACK: bumps(3, 4, 1.0),
+        INERTIA: bumps(1, 4, 1.0) + 0.02 * bumps(7, 4, 1.0),
+    }
+    explained = explain(linear_problem(linear({VISCOUS: 5.0}, twins)))
+    step, first = explained.steps[0], explained.tried[0]
+    assert step.effect in {VISCOUS, INERTIA}
+    beside = explained.problem.estimator.fit((TRACK,), explained.taken.values)
+    later = tuple(replace(s, base=beside, gain=0.0) for s in first if s.effect != step.effect)
+    refused = replace(explained, tried=(first, later))
+    assert set(alternatives(refused, replace(step, stage=1))) | {step.effect} == {VISCOUS, INERTIA}
 
 
 def test_an_effect_swapped_in_is_judged_itself(monkeypatch: pytest.MonkeyPatch) -> None:

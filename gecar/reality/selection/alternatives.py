@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from gecar.reality.fitting.model import Effects, Model, Step
@@ -17,22 +20,43 @@ ON_THE_ROBOT = {"left_angle_rad", "right_angle_rad", "yaw_rate_rad_s"}
 
 
 def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
-    """Return the effects that could stand in an effect's place: models by effect."""
-    taken, estimator = explained.taken, explained.problem.estimator
+    """Return the effects that could stand in an effect's place: models by effect.
+
+    They are judged by what an alternative would leave: one that was taken may fit what is more of a model's error.
+    """
+    taken, problem = explained.taken, explained.problem
     out = {}
-    for other in explained.tried[step.stage]:
-        if other.effect in taken.effects or other.gain < (1.0 - 2.0 * CLOSE) * step.gain:
-            continue
-        rest = [e for e in taken.effects if e != step.effect]
-        swapped = estimator.fit((*rest, other.effect), {**taken.values, **other.model.values})
-        loss = costs(swapped.errors) - costs(taken.errors)
+    rest = [e for e in taken.effects if e != step.effect]
+    for other in _rivals(explained, step, rest).values():
+        swapped = problem.estimator.fit((*rest, other.effect), {**taken.values, **other.model.values})
+        estimator = problem.under(swapped).estimator
+        now, was = (costs(estimator.whitened(problem.residuals.errors(m.physics))) for m in (swapped, taken))
+        loss = now - was
         spans = np.bincount(estimator.blocks.spans, loss)
-        close = loss.sum() < min(CLOSE * step.gain, PRICE)
+        close = abs(loss.sum()) < min(CLOSE * step.gain, PRICE)  # what fits far better was refused
         uncertain = loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2))
-        if imitates_dry_friction(explained.problem, swapped):
+        if imitates_dry_friction(problem, swapped):
             continue
-        if close and uncertain and is_worthwhile(swapped, other.effect, explained.problem.share):
+        if close and uncertain and is_worthwhile(swapped, other.effect, problem.share):
             out[other.effect] = swapped
+    return out
+
+
+def _rivals(explained: Explanation, step: Step, rest: Sequence[str]) -> dict[str, Step]:
+    """Return effects that gained about as much as one did, by effect: at its stage, and beside what is left of others.
+
+    What its stage was tried beside may have been refused since, and ``rest`` are all that are left.
+    """
+    out = dict[str, Step]()
+    for number, stage in enumerate(explained.tried):
+        own = next((each.gain for each in stage if each.effect == step.effect), math.inf)
+        if number == step.stage:
+            own = step.gain
+        elif not all(set(each.base.effects) <= set(rest) for each in stage):
+            continue
+        for other in stage:
+            if other.effect not in explained.taken.effects and other.gain >= (1.0 - 2.0 * CLOSE) * own:
+                out.setdefault(other.effect, other)
     return out
 
 
