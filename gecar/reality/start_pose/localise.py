@@ -195,9 +195,9 @@ class _ReadingMisfit:
         return fit
 
     def with_other_sensor(self, found: list[_Fit]) -> list[_Fit]:
-        """Return fits, the best first; with a late sensor mounted elsewhere where one fits, and far better than none.
+        """Return fits, the best first: those of a sensor that is late and sits elsewhere, if one fits, and far better.
 
-        A sensor that is late sees no edge where it should be, so that no start fits well, nor far better than another.
+        Such a sensor sees no edge where it should be, so that otherwise no start fits well, nor far better than others.
         """
         least = self.typical(found[0])
         if least < FITS_PCT:
