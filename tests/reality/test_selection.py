@@ -302,6 +302,26 @@ def test_alternatives_come_from_the_stage_an_effect_was_taken_at() -> None:
     assert set(alternatives(left, second)) | {second.effect} == {TRACK, INERTIA}
 
 
+@pytest.mark.parametrize(("size", "tried"), [(0.0, [VISCOUS]), (6.0, [VISCOUS, INERTIA])])
+def test_other_beginnings_are_tried_where_one_effect_leaves_much(
+    monkeypatch: pytest.MonkeyPatch, size: float, tried: list[str]
+) -> None:
+    alike = {**RESPONSES, INERTIA: RESPONSES[VISCOUS] + 0.5 * RESPONSES[INERTIA]}
+    residuals = linear({VISCOUS: 8.0}, alike)
+    residuals = replace(residuals, noise=residuals.noise + unlike(RESPONSES[VISCOUS], 9, size))
+    forward, begun = stepwise._forward, list[str]()
+
+    def noted(problem: Problem, chain: Any, first: Any, *other: Any) -> Any:
+        begun.append(first[0].effect)
+        return forward(problem, chain, first, *other)
+
+    monkeypatch.setattr(stepwise, "_forward", noted)
+    explained = explain(linear_problem(residuals))
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert explained.unexplained == bool(size)
+    assert begun == tried
+
+
 def test_an_alternative_is_judged_by_what_it_would_leave() -> None:
     twins = {VISCOUS: RESPONSES[VISCOUS], INERTIA: RESPONSES[VISCOUS] + 0.024 * RESPONSES[TRACK]}
     explained = explain(linear_problem(linear({VISCOUS: 5.0}, twins)))

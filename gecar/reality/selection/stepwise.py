@@ -355,8 +355,9 @@ def proved_steps(problem: Problem, stage: Sequence[Step]) -> Iterator[Step]:
 def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) -> list[_Chain]:
     """Return other chains: from runners-up where the first took several effects, from halves of pairs where none.
 
-    Where it took none, and leaves more than is material, what fits best may be stopped by a bound, or make whole drives
-    worse, for it stands in for two; they then leave no more than is material: what imitates is stopped by bounds, too.
+    From runners-up, too, where it took only one, and leaves more than is material: that may be like one of two, and
+    hide the other. Where it took none, and leaves as much, what fits best may be stopped by a bound, or make whole
+    drives worse, for it stands in for two. Those leave no more than is material: what imitates is stopped, too.
     """
     firsts = competing(first)[:BEGINNINGS]
     if not chain.steps:
@@ -364,7 +365,7 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
             return []
         pairs = (_beginning_with(problem, first, step) for step in firsts)
         return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
-    if len(chain.steps) < 2:
+    if len(chain.steps) == 1 and not _leaves_much(problem, chain.model):
         return []
     runners_up = [step for step in firsts if step is not first[0] and not stopped(step)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
