@@ -463,11 +463,11 @@ def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained
     """Return a stage with this explanation in place of its own, and laws added to it."""
     refused = {step.effect: step for step in stage.candidates}  # each once, as it was taken last
     written = invent(explained, stage.held, language, context.seed, context.tell, [*refused.values()])
-    if not written.terms:
+    named = {step.effect for step in written.explained.steps}
+    if not written.terms and named == {step.effect for step in explained.steps}:
         return replace(stage, explained=written.explained)
     laws, told = (*stage.laws, *written.terms), (*stage.invented, *written.invented)
     stage = replace(stage, explained=written.explained, laws=laws, invented=told)
-    named = {step.effect for step in written.explained.steps}
     candidates = tuple(step for step in stage.candidates if step.effect not in named)
     return replace(stage, candidates=candidates, spans=_spans(context, written.explained))
 

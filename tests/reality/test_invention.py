@@ -504,6 +504,24 @@ def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
     assert told.size == written.explained.problem.sizes.apart(whole.physics, rest.physics)
 
 
+@pytest.mark.parametrize(("c1", "left"), [(-1e-7, []), (-3e-4, ["c1 * speed * abs(speed)"])])
+def test_a_law_that_an_effect_makes_idle_goes(c1, left):
+    drag = Term(**{**dict(DRAG), "c1": c1})
+    robot = EV3.with_terms([drag]).with_effects({"viscous_friction": {"coefficient_nms": 4e-3}})
+    explained, _ = with_nothing_named(robot, "viscous_friction")
+    step = next(step for step in explained.tried[0] if step.effect == "viscous_friction")
+    problem = explained.problem.under(step.model)
+    first = replace(
+        explained, problem=problem, taken=problem.estimator.at(step.model, step.model.z), steps=(step,)
+    )
+    both = beside.together(first, problem, (drag,), step.model.effects, step.model.z)
+    written = beside.written_with(Written(first, (), ("of drag",)), first, both)
+    found = beside._without_idle(written, first)
+    assert [term.law for term in found.terms] == left
+    assert len(found.invented) == len(left)
+    assert found.explained.taken.effects == ("viscous_friction",)
+
+
 def test_a_law_beside_others_goes_as_a_whole_and_a_sum_part_by_part():
     scrub, drag = (
         Term(**dict(SCRUB)),

@@ -53,6 +53,17 @@ def with_effects(written: Written, first: Explanation, held: Residuals) -> Writt
         if more is None:
             break
         written = more
+    return _without_idle(written, first)
+
+
+def _without_idle(written: Written, first: Explanation) -> Written:
+    """Drop the laws that explain less than a name costs, beside an effect that was added and does all they did."""
+    for k in reversed(range(len(written.terms))):
+        fewer = (*written.terms[:k], *written.terms[k + 1 :])
+        fitted = fitted_with(written, first, fewer)
+        if fitted.cost - written.explained.taken.cost < PRICE:
+            told = (*written.invented[:k], *written.invented[k + 1 :])
+            written = replace(_refitted(written, first, fitted), invented=told)
     return written
 
 

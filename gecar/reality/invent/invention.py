@@ -106,7 +106,7 @@ def invent(
         Effects that were taken and are no findings: they may be beside a law, and a law may only hold beside them.
     """
     ports, problem, first = _ports(explained.problem), explained.problem, _as_whitened(explained)
-    written = Written(first, (), ())
+    nothing = written = Written(first, (), ())
     for number in range(MOST_LAWS):
         here = written.explained
         if len(here.problem.estimator.robot.term) == N_TERMS:
@@ -131,7 +131,7 @@ def invent(
         first = replace(first, steps=written.explained.steps)
         if not written.explained.unexplained:
             break
-    if not written.terms:
+    if written is nothing:
         return written
     written = without_absent(written, first, seed)
     return replace(written, invented=with_constants_of(written, first))
