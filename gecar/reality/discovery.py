@@ -568,10 +568,11 @@ def _located(
 ) -> MismatchMap:
     """Return where simulation and reality part, in all recordings: nothing is fitted to them here.
 
-    The last part of an only recording stays set aside, and so do recordings with an instrument that was left out.
+    Set aside stay the last part of an only recording, recordings with an instrument that was left out, and those that
+    were not looked at for the one place where all that counts was left.
     """
     motion, runs = stages[0].explained, fitted.recordings
-    if not (context.split.by_time or stages[0].left_out):
+    if not (context.split.by_time or stages[0].left_out or motion.spot):
         runs += held.recordings
     shown = replace(fitted, recordings=runs)
     sensor_unexplained = any(stage.explained.unexplained for stage in stages[1:])
