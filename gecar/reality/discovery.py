@@ -566,10 +566,10 @@ def _limits(context: _Context, stages: Sequence[_Stage]) -> dict[str, Limit | No
 def _located(
     context: _Context, stages: Sequence[_Stage], fitted: Residuals, held: Residuals, found: Robot
 ) -> MismatchMap:
-    """Return where simulation and reality part, in all recordings: nothing is fitted to them here.
+    """Return where simulation and reality part, in recordings set aside as well, as nothing is fitted to them here.
 
-    Set aside stay the last part of an only recording, recordings with an instrument that was left out, and those that
-    were not looked at for the one place where all that counts was left.
+    Only those fitted on are shown where the end of the only recording is set aside, where an instrument was left out,
+    and where all that counts is at one place, which was found in them.
     """
     motion, runs = stages[0].explained, fitted.recordings
     if not (context.split.by_time or stages[0].left_out or motion.spot):

@@ -57,14 +57,19 @@ def with_effects(written: Written, first: Explanation, held: Residuals) -> Writt
 
 
 def _without_idle(written: Written, first: Explanation) -> Written:
-    """Drop the laws that explain less than a name costs, beside an effect that was added and does all they did."""
+    """Drop the laws that gain less than a name costs, since an effect that was added later does what they did."""
     for k in reversed(range(len(written.terms))):
-        fewer = (*written.terms[:k], *written.terms[k + 1 :])
+        fewer, told = _without_law(written, k)
         fitted = fitted_with(written, first, fewer)
         if fitted.cost - written.explained.taken.cost < PRICE:
-            told = (*written.invented[:k], *written.invented[k + 1 :])
             written = replace(_refitted(written, first, fitted), invented=told)
     return written
+
+
+def _without_law(written: Written, k: int) -> tuple[Laws, tuple[Invented, ...]]:
+    """Return the laws but for the k-th, and what the verdict says of them."""
+    terms, told = written.terms, written.invented
+    return (*terms[:k], *terms[k + 1 :]), (*told[:k], *told[k + 1 :])
 
 
 def _refitted(written: Written, first: Explanation, fitted: Together) -> Written:
@@ -103,7 +108,7 @@ def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
         for fewer in shortened((law,)):
             yield (*before, *fewer, *after), written.invented
         if len(pieces(law)) == 1 and (before or after):
-            yield (*before, *after), (*written.invented[:k], *written.invented[k + 1 :])
+            yield _without_law(written, k)
 
 
 def _doing_as_much(here: Explanation, change: Array) -> set[str]:

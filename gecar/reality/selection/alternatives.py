@@ -25,27 +25,30 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
     They are judged by what an alternative would leave: one that was taken may fit what is more of a model's error.
     """
     taken, problem = explained.taken, explained.problem
-    out = {}
     rest = [e for e in taken.effects if e != step.effect]
-    for other in _rivals(explained, step, rest).values():
-        swapped = problem.estimator.fit((*rest, other.effect), {**taken.values, **other.model.values})
+    rivals, out = _rivals(explained, step, rest), dict[str, Model]()
+    if not rivals:
+        return out
+    left = problem.residuals.errors(taken.physics)
+    for effect, other in rivals.items():
+        swapped = problem.estimator.fit((*rest, effect), {**taken.values, **other.model.values})
+        if imitates_dry_friction(problem, swapped) or not is_worthwhile(swapped, effect, problem.share):
+            continue
         estimator = problem.under(swapped).estimator
-        now, was = (costs(estimator.whitened(problem.residuals.errors(m.physics))) for m in (swapped, taken))
-        loss = now - was
+        errors = problem.residuals.errors(swapped.physics)
+        loss = costs(estimator.whitened(errors)) - costs(estimator.whitened(left))
         spans = np.bincount(estimator.blocks.spans, loss)
         close = abs(loss.sum()) < min(CLOSE * step.gain, PRICE)  # what fits far better was refused
-        uncertain = loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2))
-        if imitates_dry_friction(problem, swapped):
-            continue
-        if close and uncertain and is_worthwhile(swapped, other.effect, problem.share):
-            out[other.effect] = swapped
+        if close and loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2)):
+            out[effect] = swapped
     return out
 
 
 def _rivals(explained: Explanation, step: Step, rest: Sequence[str]) -> dict[str, Step]:
-    """Return effects that gained about as much as one did, by effect: at its stage, and beside what is left of others.
+    """Return the steps of other effects that gained about as much as one did, by effect.
 
-    What its stage was tried beside may have been refused since, and ``rest`` are all that are left.
+    Those of its own stage, and of stages that had no effects but ``rest``, which are left beside it: others that were
+    taken before it may have been refused since.
     """
     out = dict[str, Step]()
     for number, stage in enumerate(explained.tried):

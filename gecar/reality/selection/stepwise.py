@@ -359,14 +359,12 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
     hide the other. Where it took none, and leaves as much, what fits best may be stopped by a bound, or make whole
     drives worse, for it stands in for two. Those leave no more than is material: what imitates is stopped, too.
     """
+    if len(chain.steps) < 2 and not _leaves_much(problem, chain.model):
+        return []
     firsts = competing(first)[:BEGINNINGS]
     if not chain.steps:
-        if not _leaves_much(problem, problem.known):
-            return []
         pairs = (_beginning_with(problem, first, step) for step in firsts)
         return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
-    if len(chain.steps) == 1 and not _leaves_much(problem, chain.model):
-        return []
     runners_up = [step for step in firsts if step is not first[0] and not stopped(step)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
     return [other for other in chains if other is not chain and other.with_camera is None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def likely_starts(points: Array, read: Array, course: Course, physics: Physics) 
     _scan(floor, GRID_M, points, read, bare, *own, math.inf, best)
     least, best = float(best[0, 0]), np.empty((HEADINGS, 4))
     _scan(floor, GRID_M, points, read, bare, x, y, angles, least, best)
-    places = [home, *_distinct(best, NEAR_M, NEAR_RAD)[:SCANNED]]
+    places = [home, *_best_first(best, NEAR_M, NEAR_RAD)[:SCANNED]]
     floor = _blurred(course, physics, FINE_M, FINE_SPOT_M)
     around = np.arange(-FINE_STEPS, FINE_STEPS + 1)
     least, finer = math.inf, []
@@ -66,16 +67,13 @@ def likely_starts(points: Array, read: Array, course: Course, physics: Physics) 
         _scan(floor, FINE_M, points, read, bare, *own, least, best)
         least = min(least, float(best[:, 0].min()))
         finer.append(best)
-    return _distinct(np.concatenate(finer), SAME_M, SAME_RAD)[:RETURNED]
+    return _best_first(np.concatenate(finer), SAME_M, SAME_RAD)[:RETURNED]
 
 
-def _distinct(found: Array, near_m: float, near_rad: float) -> list[Array]:
+def _best_first(found: Array, near_m: float, near_rad: float) -> list[Array]:
     """Return starts, best first, without those near a better one; rows are cost, x, y, heading."""
-    starts: list[Array] = []
-    for start in found[np.argsort(found[:, 0])[: np.isfinite(found[:, 0]).sum()], 1:]:
-        if not any(near(start, other, near_m, near_rad) for other in starts):
-            starts.append(start)
-    return starts
+    starts = found[np.argsort(found[:, 0])[: np.isfinite(found[:, 0]).sum()], 1:]
+    return [starts[k] for k in distinct(starts, near_m, near_rad)]
 
 
 def _blurred(course: Course, physics: Physics, pitch: float, spot: float) -> Array:
@@ -135,6 +133,15 @@ def _scan(
             if cost[cheapest] < most:
                 best[h] = cost[cheapest], x[cheapest], y[i], angles[h]
         least = min(least, best[h, 0])
+
+
+def distinct(poses: Sequence[Array] | Array, near_m: float, near_rad: float) -> list[int]:
+    """Return the numbers of poses, shape (3,) each, without those near an earlier one."""
+    kept: list[int] = []
+    for number, pose in enumerate(poses):
+        if not any(near(pose, poses[other], near_m, near_rad) for other in kept):
+            kept.append(number)
+    return kept
 
 
 def near(one: Array, other: Array, near_m: float, near_rad: float) -> bool:

@@ -17,7 +17,14 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from gecar.reality.optimisation.least_squares import KNEE, least_squares, row_by_row
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.rigid_alignment import starting_at
-from gecar.reality.start_pose.grid_search import FINE_SPOT_M, SAME_M, SAME_RAD, likely_starts, near
+from gecar.reality.start_pose.grid_search import (
+    FINE_SPOT_M,
+    SAME_M,
+    SAME_RAD,
+    distinct,
+    likely_starts,
+    near,
+)
 from gecar.world.course.course import Course
 
 Array = npt.NDArray[np.float64]
@@ -141,14 +148,17 @@ def bare_floor(t: Array, readings: Array, sd: float) -> npt.NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A path; the sensor's delay and lag [s], and how far ahead and left of its place it is [m]; the cost a reading."""
+    """A path, shape (rows, 3), and a sensor, which may have made the readings; its cost is that of a reading.
+
+    ``sensor``: its delay and lag [s], and how far ahead and to the left of its place it is mounted [m].
+    """
 
     path: Array
     sensor: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     cost: float = math.inf
 
     def changed(self, change: Array) -> _Fit:
-        """Return this with other starts, wheels and sensors, by what is added to them, shape (10,)."""
+        """Return this with a change of the start, the wheels and the sensor, in the order of `CHANGES`, shape (10,)."""
         delay, lag, ahead, left = (float(part) for part in self.sensor + change[6:])
         return replace(self, path=with_other_wheels(self.path, change[:6]), sensor=(delay, lag, ahead, left))
 
@@ -177,36 +187,34 @@ class _ReadingMisfit:
         return out
 
     def refined(self, fit: _Fit, stages: Stages = SHARPER) -> _Fit:
-        """Return the fit nearby that is best."""
+        """Return the best fit near one, stage by stage."""
         for spot, free in stages:
-            at = list(free)
-
-            def changed(z: Array, fit: _Fit = fit, at: list[int] = at) -> _Fit:
-                change = np.zeros(len(CHANGES))
-                change[at] = z * CHANGES[at]
-                return fit.changed(change)
-
-            def misfit(z: Array, changed: Any = changed, spot: float = spot) -> Array:
-                return self.errors(changed(z), spot)
-
-            far = np.full(len(at), FARTHEST)
-            found = least_squares(row_by_row(misfit), np.zeros(len(at)), (-far, far), np.full(len(at), PROBE))
-            fit = replace(changed(found.z), cost=found.cost / self._there.sum())
+            fit = self._refined(fit, spot, list(free))
         return fit
 
-    def with_other_sensor(self, found: list[_Fit]) -> list[_Fit]:
-        """Return fits, the best first: those of a sensor that is late and sits elsewhere, if one fits, and far better.
+    def _refined(self, fit: _Fit, spot_m: float, free: list[int]) -> _Fit:
+        def changed(z: Array) -> _Fit:
+            change = np.zeros(len(CHANGES))
+            change[free] = z * CHANGES[free]
+            return fit.changed(change)
 
-        Such a sensor sees no edge where it should be, so that otherwise no start fits well, nor far better than others.
+        def misfit(z: Array) -> Array:
+            return self.errors(changed(z), spot_m)
+
+        far = np.full(len(free), FARTHEST)
+        found = least_squares(row_by_row(misfit), 0.0 * far, (-far, far), np.full(len(free), PROBE))
+        return replace(changed(found.z), cost=found.cost / self._there.sum())
+
+    def with_other_sensor(self, found: list[_Fit]) -> list[_Fit]:
+        """Return fits refined with a late sensor mounted elsewhere, if the best fits then, and far better; else these.
+
+        Such a sensor sees no edge where it should be: without it no start fits well, nor far better than others.
         """
         least = self.typical(found[0])
         if least < FITS_PCT:
             return found
-        places = list[_Fit]()
-        for fit in found:
-            if not any(near(fit.path[0], other.path[0], SAME_M, SAME_RAD) for other in places):
-                places.append(fit)
-        other = sorted((self.refined(fit, WITH_SENSOR) for fit in places), key=lambda fit: fit.cost)
+        places = distinct([fit.path[0] for fit in found], SAME_M, SAME_RAD)
+        other = sorted((self.refined(found[k], WITH_SENSOR) for k in places), key=lambda fit: fit.cost)
         return other if min(least / OTHER_GAIN, KNEE_PCT) > self.typical(other[0]) else found
 
     def spread(self, fit: _Fit) -> Array:
