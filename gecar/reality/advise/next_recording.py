@@ -8,6 +8,7 @@ sensors differ most, in standard deviations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -211,7 +212,13 @@ def difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, 
 def _course_of(like: Recording) -> Course | None:
     """Return the course a recording's colour sensor read; None if there is none."""
     reads = like.setup.rig == "floor" and like.setup.course != "none" and "reflection_pct" in like.measured
-    return load_course(like.setup.course) if reads else None
+    return _course(like.setup.course) if reads else None
+
+
+@lru_cache(maxsize=1)
+def _course(name: str) -> Course:
+    """Load a course once for all that is compared on it: drawing its floor takes as long as ten replays."""
+    return load_course(name)
 
 
 def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
