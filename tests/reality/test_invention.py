@@ -383,6 +383,7 @@ def proved_law(monkeypatch):
         monkeypatch.setattr(invention, name, lambda *_: Written(None, (), ()))
     monkeypatch.setattr(invention, "_proved", lambda *_: iter([(None, None)]))
     monkeypatch.setattr(invention, "_spread", lambda *_: 0.0)
+    monkeypatch.setattr(invention, "_leaves_more", lambda *_: False)
 
 
 def test_a_law_of_uneven_size_that_leaves_much_of_a_large_error_is_refused(monkeypatch, proved_law):
@@ -396,6 +397,14 @@ def test_a_law_of_uneven_size_that_leaves_much_of_a_large_error_is_refused(monke
         monkeypatch.setattr(invention, "pruned", lambda *_, e=explained: Written(e, (), ()))
         found = invention._first_that_holds(Written(None, (), ()), None, None, [], None, None)
         assert (found is not None) == holds
+
+
+def test_beside_a_law_whole_drives_part_no_farther():
+    """A pull at one place of the floor fits what a step that was logged late did to a second of a drive."""
+    for on_bench, left, more in ((False, 3.0, True), (False, 0.9, False), (True, 3.0, False)):
+        problem = SimpleNamespace(on_bench=on_bench, material=SimpleNamespace(times=lambda left: left))
+        before, after = (SimpleNamespace(problem=problem, left=each) for each in (1.0, left))
+        assert invention._leaves_more(after, before) == more
 
 
 def test_a_further_law_must_show_in_recordings_set_aside(monkeypatch, proved_law):

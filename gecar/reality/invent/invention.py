@@ -204,6 +204,8 @@ def _first_that_holds(
     """
     for law, proof in _proved(library, found, nulls):
         more = pruned(added(written, first, library, law), first)
+        if _leaves_more(more.explained, written.explained):
+            continue
         if _spread(library, law) >= UNEVEN and _leaves_much(more.explained):
             continue
         gain = _gain_set_aside(written.explained, more.explained, held)
@@ -244,6 +246,12 @@ def _leaves_much(explained: Explanation) -> bool:
     problem = explained.problem
     left = problem.material.times(explained.left)
     return not problem.on_bench and left >= MUCH and left >= MOST * left_before(problem)
+
+
+def _leaves_more(after: Explanation, before: Explanation) -> bool:
+    """Whether whole drives part farther beside a law than without it: it describes their windows of a second only."""
+    material = after.problem.material
+    return not after.problem.on_bench and material.times(after.left) > material.times(before.left)
 
 
 def _beyond_path(library: Library, law: Law) -> bool:
