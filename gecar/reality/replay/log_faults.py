@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gecar.reality.optimisation.least_squares import costs
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.replayer import replayer_of
 
@@ -22,7 +23,6 @@ Array = npt.NDArray[np.float64]
 WHEELS = frozenset({"left_angle_rad", "right_angle_rad", "yaw_rate_rad_s"})
 LEAST_CHANGE = 0.005  # of duty: smaller ones move nothing
 AFTER_S = 0.4  # for which wheels tell when a command changed
-CLIP = 5.0  # standard deviations that one sample counts at most
 SHARES = np.array([0.5, 0.25, 0.75, 0.0, 1.0])  # of lost rows, with the next command; first: no answer
 ROUNDS = 2
 LEAST_JITTER = 0.001  # of the time between rows: less is nothing
@@ -45,12 +45,15 @@ def without_log_faults(
     """
 
     def off(tried: Recording) -> Array:
-        """Return the squared residual at each row, shape (rows,): of angles and yaw rate; without these, of poses."""
+        """Return the robust cost of each row, shape (rows,): of angles and yaw rate; without these, of poses.
+
+        A robot that is known but roughly is off by many standard deviations whenever a command changed.
+        """
         found = replayer_of(tried, sd, walk, memory_s).play(physics)
         errors = found.row_errors[:, [0, 1, 3]]
         if WHEELS.isdisjoint(tried.measured):
             errors[~np.isnan(tried.poses).all(axis=1)] = found.pose_errors
-        return np.asarray(np.minimum(np.nan_to_num(errors) ** 2, CLIP**2).sum(axis=1))
+        return np.asarray(costs(np.nan_to_num(errors)).sum(axis=1))
 
     if len(recording.t_s) < 3:
         return recording
