@@ -44,7 +44,7 @@ from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out, with_enough
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.compilation import compiled_replays
-from gecar.reality.residuals.of_case import INSTRUMENTS, Residuals, motion_residuals
+from gecar.reality.residuals.of_case import INSTRUMENTS, Physics, Residuals, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives, late_as_well
@@ -79,6 +79,8 @@ FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wh
 # Laws in the place of effects must leave so much less, or explain so much more, than laws beside them; and laws where
 # nothing material is left must leave so much less than there was.
 INSTEAD = 0.7
+REPAIRS = 3  # of logs, by the robot as it is known and as it is found
+PART_OF_ROW = 0.4  # by which times of lost commands may differ: less than a row is jitter
 
 
 @dataclass(frozen=True)
@@ -182,9 +184,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     split, known = context.split, context.robot
     context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
-    split = _without_log_faults(split, known, noise, threads)
-    fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
-    motion = _explain_motion(context, fitted, held)
+    split, problem, held, seen = _with_logs_repaired(context, noise, threads)
+    motion = _explain_motion(context, problem, held, seen)
     fitted = _along_paths(
         motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
     )
@@ -252,14 +253,48 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     )
 
 
-def _without_log_faults(split: Split, known: Robot, noise: Noise, threads: Threads) -> Split:
-    """Return the recordings with missing rows and jittering times of their logs repaired."""
+def _with_logs_repaired(
+    context: _Context, noise: Noise, threads: Threads
+) -> tuple[Split, Problem, Residuals, Confirmation]:
+    """Return the recordings with their logs repaired, and what effects explain of them: problem, held, and seen.
+
+    When a command changed in a gap of a log is told by how a robot moves, and makes up in part for what the known one
+    lacks. So all is explained once more as long as the one that was found tells it otherwise.
+    """
+    split = _without_log_faults(context.split, context.robot.physics, noise, threads)
+    for number in range(REPAIRS):
+        fitted, held = (
+            motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held)
+        )
+        problem = _problem(context, context.robot, fitted, held)
+        seen = explained_and_confirmed(problem, held)
+        physics = seen.explained.problem.with_small_changes(seen.explained.taken)
+        again = _without_log_faults(context.split, physics, noise, threads)
+        if number == REPAIRS - 1 or _are_alike(split, again):
+            break
+        context.tell("once more, with gaps of the logs as the robot that was found tells them")
+        split = again
+    return split, problem, held, seen
+
+
+def _without_log_faults(split: Split, physics: Physics, noise: Noise, threads: Threads) -> Split:
+    """Return the recordings with missing rows and jittering times of their logs repaired, by a robot's physics."""
 
     def repaired(run: Recording) -> Recording:
-        return without_log_faults(run, known.physics, noise.sd, noise.walk, MEMORY_S)
+        return without_log_faults(run, physics, noise.sd, noise.walk, MEMORY_S)
 
     fitted, held = (tuple(threads.map(repaired, runs)) for runs in (split.fitted, split.held))
     return replace(split, fitted=fitted, held=held)
+
+
+def _are_alike(one: Split, other: Split) -> bool:
+    """Whether two repairs of the same logs have commands change at the same times, but for part of a row."""
+    runs = zip((*one.fitted, *one.held), (*other.fitted, *other.held), strict=True)
+    return all(
+        np.array_equal(a.t_s, b.t_s)
+        and np.allclose(a.lost_t_s, b.lost_t_s, rtol=0.0, atol=PART_OF_ROW * float(np.median(np.diff(a.t_s))))
+        for a, b in runs
+    )
 
 
 @dataclass(frozen=True)
@@ -285,30 +320,29 @@ class _Stage(Confirmation):
     left_out: str = ""
 
 
-def _explain_motion(context: _Context, fitted: Residuals, held: Residuals) -> _Stage:
-    """Explain how the robot moved: by effects, by effects and laws, or by laws alone.
+def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: Confirmation) -> _Stage:
+    """Explain how the robot moved: by the effects that were seen, by effects and laws, or by laws alone.
 
     Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
     anew. If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
     """
-    problem = _problem(context, context.robot, fitted, held)
-    motion = _motion(context, problem, held)
+    motion = _motion(context, seen, held)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
     if renewed is not None:
         context.tell("once more with the camera's clocks as they are beside laws")
-        again = _motion(context, problem.filmed_as(renewed), held)
+        again = _motion(context, explained_and_confirmed(problem.filmed_as(renewed), held), held)
         motion = min(motion, again, key=_left)
     if motion.explained.unexplained and not motion.laws:
-        others = (_explained_without(context, each, fitted, held) for each in INSTRUMENTS)
+        others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
         motion = next(filter(None, others), motion)
     if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
 
 
-def _motion(context: _Context, problem: Problem, held: Residuals) -> _Stage:
-    """Explain the motion by effects, keep those that are confirmed, and add laws."""
-    motion = _with_intervals(context, explained_and_confirmed(problem, held), held)
+def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
+    """Explain the motion by effects that are confirmed, and add laws."""
+    motion = _with_intervals(context, seen, held)
     return _with_laws(context, _with_law_of_both_motors(context, motion))
 
 

@@ -9,14 +9,16 @@ import pytest
 from support.concealing import EV3, recorded
 
 from gecar.reality.advise.notes import notes_on_recordings
+from gecar.reality.discovery import discover
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.recordings.columns import COLUMNS
-from gecar.reality.recordings.recording import Recording
+from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.residuals.of_case import ENCODER_WAVE_RAD, motion_residuals
 from gecar.reality.residuals.threads import Threads
+from gecar.world.effects import BY_ID
 
 MEMORY_S = 1.0
 CHANGED = (80, 240, 400, 560)  # rows at which the commands of `recorded` change
@@ -72,6 +74,29 @@ def test_a_command_that_changed_after_the_gap_stays_where_it_is(whole: Recording
     found = mended(only(whole, kept), noise)
     assert found.lost_t_s == pytest.approx(whole.t_s[list(CHANGED)], abs=0.003)
     assert misfit(found, noise) < 1.1 * misfit(whole, noise)
+
+
+def test_where_all_is_off_by_many_standard_deviations_it_is_told_too(whole: Recording, noise: Noise) -> None:
+    kept = np.setdiff1d(np.arange(len(whole.t_s)), CHANGED)
+    found = without_log_faults(only(whole, kept), EV3.physics, 0.02 * noise.sd, noise.walk, MEMORY_S)
+    assert found.lost_t_s == pytest.approx(whole.t_s[list(CHANGED)], abs=0.003)
+
+
+def test_gaps_of_a_log_are_told_once_more_by_the_robot_that_was_found() -> None:
+    """Motors of twice the inertia start late, so that known ones say that each step came a row late."""
+    heavy, lines = EV3.with_effects({"rotor_inertia": {"scale": 2.0}}), list[str]()
+    whole = [recorded(heavy, seed) for seed in range(5)]
+    kept = np.setdiff1d(np.arange(len(whole[0].t_s)), CHANGED)
+    case = Case("heavy", tuple(only(run, kept) for run in whole))
+    catalogue = [BY_ID["rotor_inertia"], BY_ID["coulomb_friction"]]
+    verdict = discover(case, catalogue=catalogue, tell=lines.append)
+    (found,) = verdict.effects
+    assert any("gaps of the logs" in line for line in lines)
+    assert found.parameters["scale"].low < 2.0 < found.parameters["scale"].high
+    assert verdict.evidence is not None
+    for run in verdict.evidence.fitted.recordings:
+        changed = np.intersect1d(run.recording.lost_t_s.round(2), whole[0].t_s[list(CHANGED)].round(2))
+        assert len(changed) == len(run.recording.lost_t_s)
 
 
 def test_gaps_between_equal_commands_and_logs_without_gaps_need_nothing(
