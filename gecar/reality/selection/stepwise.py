@@ -41,6 +41,7 @@ from gecar.reality.selection.thresholds import (
     PROMISING,
     SEVERAL,
     WHOLE_SHARE,
+    WORSE,
 )
 from gecar.world.effects import BY_ID
 
@@ -260,7 +261,7 @@ def is_much(problem: Problem, now: float, before: float, allowed: float) -> bool
     allowed
         That share.
     """
-    least = 1.0 if problem.is_beyond_constants else SEVERAL
+    least = WORSE if problem.is_beyond_constants else SEVERAL
     return now > least and now / max(before, 1.0) > allowed
 
 
