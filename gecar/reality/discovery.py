@@ -45,6 +45,7 @@ from gecar.reality.recordings.split import Split, hold_out, with_enough
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.residuals.compilation import compiled_replays
 from gecar.reality.residuals.of_case import INSTRUMENTS, Physics, Residuals, motion_residuals
+from gecar.reality.residuals.parting import logs_apart
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives, late_as_well
@@ -80,7 +81,9 @@ FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wh
 # nothing material is left must leave so much less than there was.
 INSTEAD = 0.7
 REPAIRS = 3  # of logs, by the robot as it is known and as it is found
-PART_OF_ROW = 0.4  # by which times of lost commands may differ: less than a row is jitter
+OF_NO_MATTER = (
+    0.2  # of the material size: so far drives may part when it is told otherwise when commands changed
+)
 
 
 @dataclass(frozen=True)
@@ -259,22 +262,28 @@ def _with_logs_repaired(
     """Return the recordings with their logs repaired, and what effects explain of them: problem, held, and seen.
 
     When a command changed in a gap of a log is told by how a robot moves, and makes up in part for what the known one
-    lacks. So all is explained once more as long as the one that was found tells it otherwise.
+    lacks. So all is explained once more as long as the one that was found tells it otherwise, and drives part by that.
     """
     split = _without_log_faults(context.split, context.robot.physics, noise, threads)
+    fitted, held = _residuals(split, noise, threads)
     for number in range(REPAIRS):
-        fitted, held = (
-            motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held)
-        )
         problem = _problem(context, context.robot, fitted, held)
         seen = explained_and_confirmed(problem, held)
         physics = seen.explained.problem.with_small_changes(seen.explained.taken)
         again = _without_log_faults(context.split, physics, noise, threads)
-        if number == REPAIRS - 1 or _are_alike(split, again):
+        told = _residuals(again, noise, threads)
+        apart = logs_apart(fitted, told[0], physics).or_more(logs_apart(held, told[1], physics))
+        if number == REPAIRS - 1 or context.material.times(apart) < OF_NO_MATTER:
             break
         context.tell("once more, with gaps of the logs as the robot that was found tells them")
-        split = again
+        split, (fitted, held) = again, told
     return split, problem, held, seen
+
+
+def _residuals(split: Split, noise: Noise, threads: Threads) -> tuple[Residuals, Residuals]:
+    """Return the residuals of motion of the recordings fitted on, and of those set aside."""
+    fitted, held = (motion_residuals(runs, noise, MEMORY_S, threads) for runs in (split.fitted, split.held))
+    return fitted, held
 
 
 def _without_log_faults(split: Split, physics: Physics, noise: Noise, threads: Threads) -> Split:
@@ -285,16 +294,6 @@ def _without_log_faults(split: Split, physics: Physics, noise: Noise, threads: T
 
     fitted, held = (tuple(threads.map(repaired, runs)) for runs in (split.fitted, split.held))
     return replace(split, fitted=fitted, held=held)
-
-
-def _are_alike(one: Split, other: Split) -> bool:
-    """Whether two repairs of the same logs have commands change at the same times, but for part of a row."""
-    runs = zip((*one.fitted, *one.held), (*other.fitted, *other.held), strict=True)
-    return all(
-        np.array_equal(a.t_s, b.t_s)
-        and np.allclose(a.lost_t_s, b.lost_t_s, rtol=0.0, atol=PART_OF_ROW * float(np.median(np.diff(a.t_s))))
-        for a, b in runs
-    )
 
 
 @dataclass(frozen=True)

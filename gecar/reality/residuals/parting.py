@@ -134,6 +134,12 @@ class Sizes:
         return Size() if len(passing) < min(2, len(seen)) else combined(passing, statistics.median_low)
 
 
+def logs_apart(one: Residuals, other: Residuals, physics: Physics) -> Size:
+    """Return how far a robot's drives part under two readings of the same logs, in the recording where that is most."""
+    pairs = zip(one.recordings, other.recordings, strict=True)
+    return combined([_drives_apart(*(_driven(run, physics) for run in pair)) for pair in pairs])
+
+
 def _typical(sizes: list[float]) -> float:
     """Return the median; of two the smaller, as their mean would let one bad recording decide."""
     return min(sizes) if len(sizes) == 2 else statistics.median(sizes)
