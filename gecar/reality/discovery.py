@@ -80,10 +80,8 @@ FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wh
 # Laws in the place of effects must leave so much less, or explain so much more, than laws beside them; and laws where
 # nothing material is left must leave so much less than there was.
 INSTEAD = 0.7
-REPAIRS = 3  # of logs, by the robot as it is known and as it is found
-OF_NO_MATTER = (
-    0.2  # of the material size: so far drives may part when it is told otherwise when commands changed
-)
+REPAIRS = 3  # of logs, at most: by the known robot first, then by the one found
+OF_NO_MATTER = 0.2  # of the material size: a new repair that moves whole drives by less changes nothing
 
 
 @dataclass(frozen=True)
@@ -259,10 +257,10 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
 def _with_logs_repaired(
     context: _Context, noise: Noise, threads: Threads
 ) -> tuple[Split, Problem, Residuals, Confirmation]:
-    """Return the recordings with their logs repaired, and what effects explain of them: problem, held, and seen.
+    """Repair the logs and explain the motion by effects, again if the robot found repairs them otherwise.
 
-    When a command changed in a gap of a log is told by how a robot moves, and makes up in part for what the known one
-    lacks. So all is explained once more as long as the one that was found tells it otherwise, and drives part by that.
+    When a command changed in a gap of a log is told by how a robot moves; the known robot tells it so that what it
+    lacks is made up for in part. Returns the repaired recordings, the problem, held-out residuals, and what was seen.
     """
     split = _without_log_faults(context.split, context.robot.physics, noise, threads)
     fitted, held = _residuals(split, noise, threads)

@@ -249,7 +249,7 @@ def _leaves_much(explained: Explanation) -> bool:
 
 
 def _leaves_more(after: Explanation, before: Explanation) -> bool:
-    """Whether whole drives part farther beside a law than without it: it describes their windows of a second only."""
+    """Whether a law takes whole drives farther from what was measured: it fits short windows of them only."""
     material = after.problem.material
     return not after.problem.on_bench and material.times(after.left) > material.times(before.left)
 

@@ -47,7 +47,7 @@ def without_log_faults(
     def off(tried: Recording) -> Array:
         """Return the robust cost of each row, shape (rows,): of angles and yaw rate; without these, of poses.
 
-        A robot that is known but roughly is off by many standard deviations whenever a command changed.
+        It grows linearly, as a robot known only roughly is many standard deviations off whenever a command changed.
         """
         found = replayer_of(tried, sd, walk, memory_s).play(physics)
         errors = found.row_errors[:, [0, 1, 3]]

@@ -135,7 +135,7 @@ class Sizes:
 
 
 def logs_apart(one: Residuals, other: Residuals, physics: Physics) -> Size:
-    """Return how far a robot's drives part under two readings of the same logs, in the recording where that is most."""
+    """Return how far a robot's drives part under two repairs of the same logs, in the recording where that is most."""
     pairs = zip(one.recordings, other.recordings, strict=True)
     return combined([_drives_apart(*(_driven(run, physics) for run in pair)) for pair in pairs])
 
