@@ -14,9 +14,10 @@ from gecar.reality.noise.sensor_noise import Noise, estimate_noise
 from gecar.reality.recordings.columns import COLUMNS
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split
+from gecar.reality.replay.kernel import YAW_RATE
 from gecar.reality.replay.log_faults import without_log_faults
 from gecar.reality.replay.replayer import replayer_of
-from gecar.reality.residuals.of_case import ENCODER_WAVE_RAD, motion_residuals
+from gecar.reality.residuals.of_case import ENCODER_WAVE_RAD, GYRO_SCALE, motion_residuals
 from gecar.reality.residuals.threads import Threads
 from gecar.world.effects import BY_ID
 
@@ -143,7 +144,22 @@ def test_an_encoder_s_wave_adds_to_residuals_what_is_foretold(whole: Recording, 
     waving = replace(whole, left_angle_rad=angle + ENCODER_WAVE_RAD * np.sin(angle))
     plain, waved = (motion_residuals([run], noise, MEMORY_S, Threads(1)) for run in (whole, waving))
     added = waved.errors(EV3.physics) - plain.errors(EV3.physics)
-    sine = plain.instrument_errors[:, 3]
+    foretold = plain.instrument_errors(EV3.physics)
+    sine = foretold[:, 3]
     assert np.abs(added).max() > 0.5
     assert added == pytest.approx(sine, abs=1e-6)
-    assert np.all(plain.instrument_errors[plain.index.channel > 1, 3:] == 0.0)
+    assert np.all(foretold[plain.index.channel > 1, 3:] == 0.0)
+
+
+def test_a_gyro_s_errors_are_those_of_the_rates_predicted_whatever_noise_was_measured(
+    whole: Recording, noise: Noise
+) -> None:
+    rate = replayer_of(whole, noise.sd, noise.walk, MEMORY_S).play(EV3.physics).rows[:, YAW_RATE]
+    shaking = np.random.default_rng(0).normal(0.0, np.radians(2.0), len(rate))
+    exact, scaled, noisy = (
+        motion_residuals([replace(whole, yaw_rate_rad_s=rates)], noise, MEMORY_S, Threads(1))
+        for rates in (rate, (1.0 + GYRO_SCALE) * rate, rate + shaking)
+    )
+    added = scaled.errors(EV3.physics) - exact.errors(EV3.physics)
+    assert added == pytest.approx(exact.instrument_errors(EV3.physics)[:, 0], abs=1e-9)
+    assert np.array_equal(noisy.instrument_errors(EV3.physics), exact.instrument_errors(EV3.physics))

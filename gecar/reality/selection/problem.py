@@ -451,7 +451,7 @@ def small_sensitivities(
         if RIPPLE not in model.effects:
             waves = ripple_responses(plain.robot, problem.recordings, plain.trial(model, RIPPLE))
             out[RIPPLE] = np.concatenate([np.zeros((len(model.errors), 0)), *waves], axis=1)
-    return {**out, "": problem.residuals.instrument_errors}
+    return {**out, "": problem.residuals.instrument_errors(model.physics)}
 
 
 def _small(effect: str) -> list[Parameter]:
