@@ -105,3 +105,30 @@ def test_clocks_fitted_before_a_law_was_known_are_fitted_anew_beside_it() -> Non
     assert again.residuals.clock_offsets_s == pytest.approx(offsets, abs=0.001)
     assert again.clocks_fitted
     assert not again.estimator.robot.term
+
+
+CATALOGUE = (
+    "command_slew", "clock_skew", "supply_voltage", "wheel_radius", "pose_delay", "current_limit", "torque_ripple",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("effects", "seed", "late_s"),
+    [
+        ({"command_slew": {"rate_pct_s": 2400.0}}, 1, 0.0),
+        ({"command_slew": {"rate_pct_s": 2400.0}}, 2, 0.0),
+        ({"command_slew": {"rate_pct_s": 2400.0}, "clock_skew": {"rate": -0.03}}, 1, 0.0),
+        ({"command_slew": {"rate_pct_s": 2400.0}}, 1, 0.03),
+        ({}, 1, -0.03),
+    ],
+)
+def test_the_clock_of_an_only_recording_takes_up_nothing_that_makes_a_robot_late(
+    effects: dict[str, dict[str, float]], seed: int, late_s: float
+) -> None:
+    """Commands that ramp make a robot without encoders 20 ms late: as late as a camera may be."""
+    run = late(recorded(EV3.with_effects(effects), seed), late_s)
+    unseen = np.full(len(run.t_s), np.nan)
+    blind = replace(run, left_angle_rad=unseen, right_angle_rad=unseen)
+    explained = explain(problem_of(motion_of([blind]), EV3, CATALOGUE))
+    assert {step.effect for step in explained.steps} == set(effects)
+    assert explained.problem.residuals.clock_offsets_s == pytest.approx([late_s], abs=0.002)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from gecar.reality.fitting.parameters import Coordinate, free, torque_scale
 from gecar.reality.optimisation.least_squares import cost, cost_of_each, residuals_of_each, weights
 from gecar.reality.recordings.recording import Recording
+from gecar.reality.replay.kernel import TIMING
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
@@ -27,6 +28,14 @@ Errors = Callable[[Sequence[Values]], Array]
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (0.5, 3.0, 12.0)  # in steps worth a name; where less is material, fits begin at less
+_TIMES = (
+    0.5,
+    1.5,
+    3.0,
+    5.0,
+    7.5,
+    12.0,
+)  # of what moves commands against steps: fits of it end at the next small dip
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
@@ -95,7 +104,7 @@ def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
 def _sizes(c: Coordinate) -> Iterator[float]:
     if c.parameter.worthwhile <= 0.0:
         return
-    for z in _SIZES:
+    for z in _TIMES if c.parameter.field in TIMING else _SIZES:
         for side in (z, -z):
             if c.parameter.low <= c.neutral + side * c.step <= c.parameter.high * c.scale:
                 yield c.value(side)

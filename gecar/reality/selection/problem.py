@@ -103,6 +103,11 @@ class Problem:
         return tuple(r.recording for r in self.residuals.recordings)
 
     @property
+    def is_only_one(self) -> bool:
+        """Whether there is only one recording: its camera's late clock is the same as a late camera."""
+        return len(self.residuals.recordings) == 1
+
+    @property
     def blocks(self) -> int:
         """Number of blocks of residuals."""
         return self.estimator.blocks.count
@@ -289,20 +294,20 @@ class Problem:
         held = held.with_mark(self.residuals.mark)
         return with_fitted_clocks(held, physics)[0] if self.clocks_fitted else held
 
-    def with_clocks(self, model: Model, least_gain: float) -> Problem | None:
-        """Return the problem with camera clocks fitted under a model; None where that gains less than ``least_gain``.
+    def with_clocks(self, model: Model, least_gain: float = 0.0) -> Problem | None:
+        """Return the problem with camera clocks fitted under a model; None where too little is gained by it.
 
-        After that, a delay common to all cameras is no effect any more.
+        That is ``least_gain``, or what a name costs. After that a delay common to all cameras is no effect any more.
         """
         if self.clocks_fitted or self.residuals.sensor:
             return None
         fitted, _ = with_fitted_clocks(self.residuals, model.physics)
         before, after = (self.estimator.cost_of(r.errors(model.physics)) for r in (self.residuals, fitted))
-        alone = len(fitted.recordings) == 1  # then a late clock is what a late camera is
-        least = PRICE if alone else max(least_gain, PRICE)
-        if before - after < least or not (alone or scattered(fitted.clock_offsets_s)):
+        differ = self.is_only_one or scattered(fitted.clock_offsets_s)
+        if before - after < max(least_gain, PRICE) or not differ:
             return None
-        self.tell("the camera's clock differs from recording to recording: its offsets are fitted")
+        late = "is late" if self.is_only_one else "differs from recording to recording"
+        self.tell(f"the camera's clock {late}: it is fitted")
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
         return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
 

@@ -109,6 +109,9 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     best = _best_chain(problem, [chain, *others])
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
+    late = _with_late_clock(problem, model)
+    if late is not None:
+        return explain(late, once_more)
     renewed = None if once_more else _with_camera_beside(problem.under(model), model)
     if renewed is not None:
         return explain(renewed, once_more=True)
@@ -465,13 +468,29 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
 
 
 def _with_camera(problem: Problem, model: Model, stage: Sequence[Step]) -> Problem | None:
-    """Return the problem with camera clocks or mark fitted, where they gain as much as the best effect of a stage."""
+    """Return the problem with camera clocks or mark fitted, where they gain as much as the best effect of a stage.
+
+    The clock of an only recording waits: fitted first, it takes up what makes a robot late, too.
+    """
     best = stage[0].gain if stage else 0.0
     common = max((step.gain for step in stage if step.effect == COMMON_DELAY), default=0.0)
-    with_clocks = problem.with_clocks(model, max(CLOCKS_FIRST * best, CLOCKS_OVER_COMMON * common))
+    least = max(CLOCKS_FIRST * best, CLOCKS_OVER_COMMON * common)
+    with_clocks = None if problem.is_only_one else problem.with_clocks(model, least)
     if with_clocks is not None or problem.mark_fitted:
         return with_clocks
     return _with_mark(problem, model, best)
+
+
+def _with_late_clock(problem: Problem, model: Model) -> Problem | None:
+    """Return the problem with the clock of an only recording's camera fitted beside a model's effects, if it is late.
+
+    Where the model holds a camera's delay, that is what it is.
+    """
+    if not problem.is_only_one:
+        return None
+    rest = [effect for effect in model.effects if effect != COMMON_DELAY]
+    here = problem.under(model)
+    return here.with_clocks(here.estimator.fit(rest, model.values, rounds=0))
 
 
 def _with_camera_beside(problem: Problem, model: Model) -> Problem | None:
