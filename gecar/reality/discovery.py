@@ -264,9 +264,10 @@ def _with_logs_repaired(
     """
     split = _without_log_faults(context.split, context.robot.physics, noise, threads)
     fitted, held = _residuals(split, noise, threads)
+    before: Confirmation | None = None
     for number in range(REPAIRS):
         problem = _problem(context, context.robot, fitted, held)
-        seen = explained_and_confirmed(problem, held)
+        seen = (before and _once_more(problem, held, before)) or explained_and_confirmed(problem, held)
         physics = seen.explained.problem.with_small_changes(seen.explained.taken)
         again = _without_log_faults(context.split, physics, noise, threads)
         told = _residuals(again, noise, threads)
@@ -274,8 +275,19 @@ def _with_logs_repaired(
         if number == REPAIRS - 1 or context.material.times(apart) < OF_NO_MATTER:
             break
         context.tell("once more, with gaps of the logs as the robot that was found tells them")
-        split, (fitted, held) = again, told
+        split, (fitted, held), before = again, told, seen
     return split, problem, held, seen
+
+
+def _once_more(problem: Problem, held: Residuals, before: Confirmation) -> Confirmation | None:
+    """Explain logs repaired anew by the effects found in them before; None where these are not all, or not enough."""
+    found = before.explained
+    camera = found.problem.clocks_fitted or found.problem.mark_fitted
+    if not found.steps or found.unexplained or before.candidates or camera:
+        return None
+    again = confirmed(resumed(problem, found, found.tried), held)
+    alike = {step.effect for step in again.explained.steps} == {step.effect for step in found.steps}
+    return again if alike and not (again.candidates or again.explained.unexplained) else None
 
 
 def _residuals(split: Split, noise: Noise, threads: Threads) -> tuple[Residuals, Residuals]:

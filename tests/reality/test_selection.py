@@ -190,6 +190,8 @@ def test_what_a_part_shows_may_explain_all_and_is_judged_by_all() -> None:
     assert sorted(explained.taken.z) == pytest.approx([3.0, 4.0], abs=0.1)
     assert all(len(step.base.errors) == len(both.noise) for step in explained.steps)
     assert not explained.unexplained
+    small = replace(found, steps=found.steps[:1], minor=found.steps[1:], whole=found.taken)
+    assert {step.effect for step in resumed(linear_problem(both), small).steps} == {VISCOUS, TRACK}
     one = linear({VISCOUS: 3.0}, RESPONSES)
     assert [step.effect for step in resumed(linear_problem(one), found).steps] == [VISCOUS]
 

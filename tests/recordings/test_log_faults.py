@@ -93,6 +93,8 @@ def test_gaps_of_a_log_are_told_once_more_by_the_robot_that_was_found() -> None:
     verdict = discover(case, catalogue=catalogue, tell=lines.append)
     (found,) = verdict.effects
     assert any("gaps of the logs" in line for line in lines)
+    again = max(k for k, line in enumerate(lines) if "gaps of the logs" in line)
+    assert not any("gains" in line for line in lines[again:])  # what was found before is not looked for anew
     assert found.parameters["scale"].low < 2.0 < found.parameters["scale"].high
     assert verdict.evidence is not None
     for run in verdict.evidence.fitted.recordings:

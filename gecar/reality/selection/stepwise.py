@@ -179,11 +179,15 @@ def concluded(
     return Explanation(problem, model, named, tuple(tried), left, much, minor, whole, drifting=drifting)
 
 
-def resumed(problem: Problem, found: Explanation) -> Explanation:
-    """Explain all residuals by the effects that were found in a part of them, each judged beside the others."""
-    model = _fitted_anew(problem, found.taken, found.steps)
-    steps = [beside_others(problem.under(model), model, step) for step in found.steps]
-    model, kept = _swapped_and_dropped(problem, _Chain(tuple(steps), model, ()), ())
+def resumed(problem: Problem, found: Explanation, rivals: Sequence[Sequence[Step]] = ()) -> Explanation:
+    """Explain all residuals by the effects that were found in others of them, each judged beside the others.
+
+    Small ones are among them. ``rivals`` are the stages whose runners-up are tried in their place.
+    """
+    steps = (*found.steps, *found.minor)
+    model = _fitted_anew(problem, found.whole, steps)
+    beside = [beside_others(problem.under(model), model, step) for step in steps]
+    model, kept = _swapped_and_dropped(problem, _Chain(tuple(beside), model, ()), rivals)
     return concluded(problem, model, kept, found.tried)
 
 
