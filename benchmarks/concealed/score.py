@@ -126,8 +126,18 @@ def figures(judged: Sequence[Judged]) -> list[Figure]:
             ">= 0.90",
         ),
         _share("two at once: exact set", [one.exact for one in of["double"]], ">= 0.85"),
+        _share(
+            "the same, where both are material beside each other",
+            [one.exact for one in of["double"] if one.all_material],
+            "",
+        ),
         _share("two at once: at least one right", [bool(one.hits) for one in of["double"]], ""),
         _share("three at once: exact set", [one.exact for one in of["triple"]], ">= 0.65"),
+        _share(
+            "the same, where all are material beside each other",
+            [one.exact for one in of["triple"] if one.all_material],
+            "",
+        ),
         _share("mixed: effect named, rest unexplained", [one.half_explained for one in of["mixed"]], ""),
         _share(
             "the same, where both are material",
