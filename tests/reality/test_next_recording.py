@@ -6,25 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
 from gecar.reality.advise.next_recording import LEAST_DIFFERENCE, LIBRARY, difference, suggest
 from gecar.reality.advise.notes import never_apart
 from gecar.reality.materiality import Size
-from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.recordings.split import Split
+from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.verdict import Found, Limit
 from gecar.world.robot import Robot
 
 
-def seen_on(course: str) -> Recording:
+def seen_on(course: str) -> RecordingResiduals:
     run = recorded(EV3, 1)
-    return replace(run, setup=replace(run.setup, course=course), reflection_pct=np.full(len(run.t_s), 100.0))
+    run = replace(run, setup=replace(run.setup, course=course), reflection_pct=np.full(len(run.t_s), 100.0))
+    return motion_of([run]).recordings[0]
 
 
 LIKE = seen_on("paper")
-NOISE = estimate_noise([LIKE], EV3.physics, 1.0)
 
 
 def with_effect(effect: str, label: str, value: float) -> Robot:
@@ -37,13 +37,13 @@ LATE, LAGGING = (
 )
 
 
-def parted(like: Recording, one: Robot = LATE, other: Robot = LAGGING) -> dict[str, float]:
-    return {name: difference(commands, one, other, like, NOISE) for name, commands in LIBRARY.items()}
+def parted(like: RecordingResiduals, one: Robot = LATE, other: Robot = LAGGING) -> dict[str, float]:
+    return {name: difference(commands, one, other, like) for name, commands in LIBRARY.items()}
 
 
 def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
     found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
-    suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False)
+    suggested = suggest(LATE, found, [LAGGING], LIKE, unexplained=False)
     differences = parted(LIKE)
     best = max(differences, key=lambda name: differences[name])
     assert differences[best] > 100.0
@@ -53,7 +53,7 @@ def test_sensors_that_differ_are_told_apart_by_crossing_lines() -> None:
 
 def test_where_no_sequence_tells_two_robots_apart_that_is_said() -> None:
     found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
-    suggested = suggest(LATE, found, [LAGGING], seen_on("none"), NOISE, unexplained=False)
+    suggested = suggest(LATE, found, [LAGGING], seen_on("none"), unexplained=False)
     assert "no sequence of the library distinguishes" in suggested.why
 
 
@@ -66,7 +66,7 @@ def test_motors_that_differ_are_told_apart_without_a_line(effect: str, value: fl
 
 def test_what_these_recordings_say_nothing_of_is_asked_for() -> None:
     unseen = {"backlash": None, "sensor_delay": None, "track_width": Limit(0.01, "1")}
-    suggested = suggest(EV3, (), [], LIKE, NOISE, unexplained=False, limits=unseen)
+    suggested = suggest(EV3, (), [], LIKE, unexplained=False, limits=unseen)
     name, why = suggested.why.split(": ")
     assert "backlash" in why
     assert "track_width" not in why
@@ -75,9 +75,9 @@ def test_what_these_recordings_say_nothing_of_is_asked_for() -> None:
 
 def test_the_recording_shows_the_effect_one_asks_about() -> None:
     found = (Found("sensor_delay", ("sensor_lag",), {}, 1.0, 1.0, 0.01, Size()),)
-    suggested = suggest(LATE, found, [LAGGING], LIKE, NOISE, unexplained=False, about="floor_tilt")
+    suggested = suggest(LATE, found, [LAGGING], LIKE, unexplained=False, about="floor_tilt")
     assert suggested.why.endswith("would show floor_tilt")
-    blind = suggest(EV3, (), [], seen_on("none"), NOISE, unexplained=False, about="sensor_lag")
+    blind = suggest(EV3, (), [], seen_on("none"), unexplained=False, about="sensor_lag")
     assert "no sequence of the library shows sensor_lag with these sensors" in blind.why
 
 

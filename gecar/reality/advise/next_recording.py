@@ -8,20 +8,19 @@ sensors differ most, in standard deviations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.parameters import free
-from gecar.reality.noise.sensor_noise import Noise
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import HEADING, LEFT_ANGLE, RIGHT_ANGLE, X, Y
 from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
+from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.verdict import Found, Invented, Limit, NextRecording
-from gecar.world.course.course import Course, load_course
+from gecar.world.course.course import Course
 from gecar.world.robot import Robot
 from gecar.world.terms import Term
 
@@ -62,8 +61,7 @@ def suggest(
     robot: Robot,
     found: Sequence[Found],
     rivals: Sequence[Robot],
-    like: Recording,
-    noise: Noise,
+    like: RecordingResiduals,
     unexplained: bool,
     laws: Sequence[Invented] = (),
     limits: Mapping[str, Limit | None] | None = None,
@@ -83,9 +81,7 @@ def suggest(
     rivals
         Robots that do as well on these recordings, one for each effect that has alternatives.
     like
-        A recording whose rig and columns the next one will have.
-    noise
-        Of the sensors.
+        A recording whose rig, sensors and course the next one will have.
     unexplained
         Whether something is left that nothing explains.
     laws
@@ -98,29 +94,29 @@ def suggest(
     unseen = [effect for effect, limit in (limits or {}).items() if limit is None]
     name, why = "reversals", "nothing is missing so far; this stresses gears, friction and grip most"
     if about:
-        name, why = _showing(robot, [about], like, noise)
+        name, why = _showing(robot, [about], like)
     elif rivals:
         confused = next(f for f in found if f.alternatives)
-        name, told = _distinguishing(robot, rivals[0], like, noise)
+        name, told = _distinguishing(robot, rivals[0], like)
         why = f"{told} {confused.id} from {_listed(confused.alternatives)}"
     elif laws:
-        name, why = _about_laws(robot, laws, like, noise)
+        name, why = _about_laws(robot, laws, like)
     elif unexplained:
         name = "long and slow, then long and fast"
         why = "shows whether the residual depends on speed, distance or time"
     elif found:
-        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like, noise)
+        name, _ = _telling(robot, _at_interval_end(robot, found[0]), like)
         why = f"narrows the interval of {found[0].id} further"
     elif unseen:
-        name, why = _showing(robot, unseen, like, noise)
+        name, why = _showing(robot, unseen, like)
     return NextRecording(f"{name}: {why}", LIBRARY[name])
 
 
-def _showing(robot: Robot, effects: Sequence[str], like: Recording, noise: Noise) -> tuple[str, str]:
+def _showing(robot: Robot, effects: Sequence[str], like: RecordingResiduals) -> tuple[str, str]:
     """Return the sequence that shows most of some effects, each of a size worth a name, and which it shows."""
     rivals = {effect: _with_effect(robot, effect) for effect in effects}
     shown = {
-        name: [e for e in effects if difference(commands, robot, rivals[e], like, noise) >= LEAST_DIFFERENCE]
+        name: [e for e in effects if difference(commands, robot, rivals[e], like) >= LEAST_DIFFERENCE]
         for name, commands in LIBRARY.items()
     }
     best = max(shown, key=lambda name: len(shown[name]))
@@ -129,9 +125,9 @@ def _showing(robot: Robot, effects: Sequence[str], like: Recording, noise: Noise
     return best, f"no sequence of the library shows {_listed(effects)} with these sensors"
 
 
-def _distinguishing(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, str]:
+def _distinguishing(robot: Robot, rival: Robot, like: RecordingResiduals) -> tuple[str, str]:
     """Return the sequence in which two robots part furthest, and whether that is far enough, as a verb."""
-    name, apart = _telling(robot, rival, like, noise)
+    name, apart = _telling(robot, rival, like)
     return name, "distinguishes" if apart >= LEAST_DIFFERENCE else "no sequence of the library distinguishes"
 
 
@@ -155,14 +151,14 @@ def _at_interval_end(robot: Robot, found: Found) -> Robot:
     return robot.with_effects({found.id: {**values, label: interval.high}})
 
 
-def _about_laws(robot: Robot, laws: Sequence[Invented], like: Recording, noise: Noise) -> tuple[str, str]:
+def _about_laws(robot: Robot, laws: Sequence[Invented], like: RecordingResiduals) -> tuple[str, str]:
     """Return what tells a law from one that does as well at another port, or else knows its constants better."""
     doubtful = next((law for law in laws if law.alternatives), None)
     if doubtful is None:
-        name, _ = _telling(robot, _with_law(robot, laws[0].term, _at_end(laws[0])), like, noise)
+        name, _ = _telling(robot, _with_law(robot, laws[0].term, _at_end(laws[0])), like)
         return name, f"narrows the constants of the law at {laws[0].term.port} further"
     law, other = doubtful.term, doubtful.alternatives[0]
-    name, told = _distinguishing(robot, _with_law(robot, law, other), like, noise)
+    name, told = _distinguishing(robot, _with_law(robot, law, other), like)
     return name, f"{told} a law at {law.port} from one at {other.port}"
 
 
@@ -177,29 +173,29 @@ def _at_end(law: Invented) -> Term:
     return law.term.with_constants({name: interval.high})
 
 
-def _telling(robot: Robot, rival: Robot, like: Recording, noise: Noise) -> tuple[str, float]:
+def _telling(robot: Robot, rival: Robot, like: RecordingResiduals) -> tuple[str, float]:
     """Return the sequence in which two robots part furthest, and how far [squared standard deviations]."""
-    apart = {name: difference(commands, robot, rival, like, noise) for name, commands in LIBRARY.items()}
+    apart = {name: difference(commands, robot, rival, like) for name, commands in LIBRARY.items()}
     best = max(apart, key=lambda name: apart[name])
     return best, apart[best]
 
 
-def difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, noise: Noise) -> float:
+def difference(commands: Commands, robot: Robot, rival: Robot, like: RecordingResiduals) -> float:
     """Return how far apart two robots' recordings of a command sequence lie, in squared standard deviations.
 
     What encoders and camera would measure of the first is replayed by the second; what the colour sensors of both would
     read is compared along the first one's path, on the course of a recording that read one.
     """
-    course = _course_of(like)
+    course, noise, run = like.course, like.noise, like.recording
     start = START if course is None else (course.start.x_m, course.start.y_m, course.start.heading_rad)
-    rows = replayer_of(_recording(commands, {}, like), noise.sd).play(robot.physics, np.array(start)).rows
+    rows = replayer_of(_recording(commands, {}, run), noise.sd).play(robot.physics, np.array(start)).rows
     angles = {
         "left_angle_deg": np.degrees(rows[:, LEFT_ANGLE]),
         "right_angle_deg": np.degrees(rows[:, RIGHT_ANGLE]),
     }
     poses = {"x_m": rows[:, X], "y_m": rows[:, Y], "heading_deg": np.degrees(rows[:, HEADING])}
-    measured = {**angles, **(poses if like.setup.rig == "floor" else {})}
-    replayer = replayer_of(_recording(commands, measured, like), noise.sd, noise.walk, memory_s=1.0)
+    measured = {**angles, **(poses if run.setup.rig == "floor" else {})}
+    replayer = replayer_of(_recording(commands, measured, run), noise.sd, noise.walk, memory_s=1.0)
     found = replayer.play(rival.physics)
     apart = float(np.nansum(found.row_errors[:, :2] ** 2) + np.nansum(found.pose_errors**2))
     if course is None:
@@ -207,18 +203,6 @@ def difference(commands: Commands, robot: Robot, rival: Robot, like: Recording, 
     path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
     own, other = (_readings(replayer.t, path, course, r, noise.reflection_sd) for r in (robot, rival))
     return apart + float(np.sum((own - other) ** 2)) / noise.reflection_sd**2
-
-
-def _course_of(like: Recording) -> Course | None:
-    """Return the course a recording's colour sensor read; None if there is none."""
-    reads = like.setup.rig == "floor" and like.setup.course != "none" and "reflection_pct" in like.measured
-    return _course(like.setup.course) if reads else None
-
-
-@lru_cache(maxsize=1)
-def _course(name: str) -> Course:
-    """Load a course once for all that is compared on it: drawing its floor takes as long as ten replays."""
-    return load_course(name)
 
 
 def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
