@@ -256,7 +256,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
 def _with_logs_repaired(
     context: _Context, noise: Noise, threads: Threads
 ) -> tuple[Split, Problem, Residuals, Confirmation]:
-    """Repair the logs and explain the motion by effects, again if the robot found repairs them otherwise.
+    """Repair the logs and explain the motion by effects; again where the robot found repairs the logs otherwise.
 
     When a command changed in a gap of a log is told by how a robot moves; the known robot tells it so that what it
     lacks is made up for in part. Returns the repaired recordings, the problem, held-out residuals, and what was seen.
@@ -279,7 +279,7 @@ def _with_logs_repaired(
 
 
 def _once_more(problem: Problem, held: Residuals, before: Confirmation) -> Confirmation | None:
-    """Explain logs repaired anew by the effects found in them before; None where these are not all, or not enough."""
+    """Explain newly repaired logs by the effects found before; None where these change, or leave what is material."""
     found = before.explained
     camera = found.problem.clocks_fitted or found.problem.mark_fitted
     if not found.steps or found.unexplained or before.candidates or camera:

@@ -104,7 +104,7 @@ class Problem:
 
     @property
     def is_only_one(self) -> bool:
-        """Whether there is only one recording: its camera's late clock is the same as a late camera."""
+        """Whether there is only one recording: then nothing tells a late camera clock from a late camera."""
         return len(self.residuals.recordings) == 1
 
     @property

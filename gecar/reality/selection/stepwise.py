@@ -180,9 +180,9 @@ def concluded(
 
 
 def resumed(problem: Problem, found: Explanation, rivals: Sequence[Sequence[Step]] = ()) -> Explanation:
-    """Explain all residuals by the effects that were found in others of them, each judged beside the others.
+    """Explain residuals by effects found before in similar ones, small effects too; each is judged beside the others.
 
-    Small ones are among them. ``rivals`` are the stages whose runners-up are tried in their place.
+    ``rivals`` are the stages whose runners-up are tried in their place.
     """
     steps = (*found.steps, *found.minor)
     model = _fitted_anew(problem, found.whole, steps)
