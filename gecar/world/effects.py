@@ -357,7 +357,7 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("clock_skew", "rate", "-", -0.06, 0.06, 0.0, 0.004),),
            ("clock",), "grows with time", "log time = true time x (1 + rate)"),
     Effect("pose_delay", "camera poses are late",
-           (_P("pose_delay", "time_s", "s", -0.1, 0.3, 0.0, 0.005),),
+           (_P("pose_delay", "time_s", "s", 0.0, 0.3, 0.0, 0.005),),
            ("pose", "clock"), "all motion, in the pose only", "pure delay between motion and logged pose",
            needs=("floor", "pose")),
 )  # fmt: skip

@@ -53,6 +53,18 @@ def test_one_delay_common_to_all_is_no_scatter() -> None:
     assert scattered(np.array([0.03, -0.03]))
 
 
+@pytest.mark.parametrize(("by_s", "named"), [(-0.03, []), (0.03, ["pose_delay"])])
+def test_a_clock_that_is_early_by_the_same_everywhere_is_no_late_camera(
+    by_s: float, named: list[str]
+) -> None:
+    """Nothing shows a camera where the robot will be, but its clock may be early."""
+    explained = explain(problem_of(beside(by_s, by_s, by_s), EV3, ("rotor_inertia", "pose_delay")))
+    assert [step.effect for step in explained.steps] == named
+    assert explained.problem.clocks_fitted is not bool(named)
+    expected = [0.0 if named else by_s] * 3
+    assert explained.problem.residuals.clock_offsets_s == pytest.approx(expected, abs=0.002)
+
+
 @pytest.mark.parametrize(
     ("effect", "fitted", "wheels", "instead"),
     [

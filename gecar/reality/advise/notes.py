@@ -115,8 +115,10 @@ def notes_on_recordings(
             " were set aside, too."
         )
     if clocks_fitted:
-        late = ", ".join(f"{1e3 * o:.0f}" for o in fitted.clock_offsets_s)
-        notes.append(f"The camera's clock was late by {late} ms in the recordings. This was corrected.")
+        early = max(fitted.clock_offsets_s) < 0.0
+        word, sign = ("early", -1e3) if early else ("late", 1e3)
+        by = ", ".join(f"{sign * o:.0f}" for o in fitted.clock_offsets_s)
+        notes.append(f"The camera's clock was {word} by {by} ms in the recordings. This was corrected.")
     notes += _mark(fitted)
     if doubted:
         notes.append(

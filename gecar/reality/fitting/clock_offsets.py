@@ -1,8 +1,8 @@
 """Each recording's camera clock offset, fitted under a model of the motion.
 
-Clocks started by hand are late by another time in every recording: a nuisance, fitted and never named. One delay
-common to all is the effect ``pose_delay``. Both compete with the effects at every stage: fitted too early, clocks
-would take up a delay of the motors.
+Clocks started by hand are late by another time in every recording: a nuisance, fitted and never named. So is a clock
+that is early, by the same time in all; one delay common to all is the effect ``pose_delay``. Both compete with the
+effects at every stage: fitted too early, clocks would take up a delay of the motors.
 """
 
 from __future__ import annotations

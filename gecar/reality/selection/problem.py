@@ -297,16 +297,18 @@ class Problem:
     def with_clocks(self, model: Model, least_gain: float = 0.0) -> Problem | None:
         """Return the problem with camera clocks fitted under a model; None where too little is gained by it.
 
-        That is ``least_gain``, or what a name costs. After that a delay common to all cameras is no effect any more.
+        That is ``least_gain``, or what a name costs. Clocks late by the same time in all recordings are a late camera,
+        an effect; no camera is early, but its clocks may be. Once they are fitted, a late camera is no effect any more.
         """
         if self.clocks_fitted or self.residuals.sensor:
             return None
         fitted, _ = with_fitted_clocks(self.residuals, model.physics)
         before, after = (self.estimator.cost_of(r.errors(model.physics)) for r in (self.residuals, fitted))
-        differ = self.is_only_one or scattered(fitted.clock_offsets_s)
-        if before - after < max(least_gain, PRICE) or not differ:
+        offsets = fitted.clock_offsets_s
+        early, differ = float(np.mean(offsets)) < 0.0, scattered(offsets)
+        if before - after < max(least_gain, PRICE) or not (self.is_only_one or early or differ):
             return None
-        late = "is late" if self.is_only_one else "differs from recording to recording"
+        late = "differs from recording to recording" if differ else "is early" if early else "is late"
         self.tell(f"the camera's clock {late}: it is fitted")
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
         return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
