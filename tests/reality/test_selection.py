@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from support.linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
 
 from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.parameters import free
 from gecar.reality.materiality import Size
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
@@ -35,6 +36,7 @@ from gecar.world.rollout import STEP_S
 CLOCK = "clock_skew"
 YAW_RATE = CHANNELS.index("yaw_rate")
 VISCOUS, INERTIA, TRACK = "viscous_friction", "rotor_inertia", "track_width"
+BACKLASH = "backlash"
 RESPONSES = {VISCOUS: bumps(1, 4, 1.0), INERTIA: bumps(2, 4, 1.0), TRACK: bumps(3, 4, 1.0)}
 
 
@@ -45,6 +47,20 @@ class SteppedResiduals(LinearResiduals):
     def later(self, seconds: float) -> SteppedResiduals:
         side = np.cos(2.0 * np.pi * seconds / STEP_S)
         return replace(self, truth={effect: side * size for effect, size in self.truth.items()})
+
+
+@dataclass(frozen=True)
+class TerracedResiduals(LinearResiduals):
+    """Residuals that change only at every second size: derivatives say nothing."""
+
+    def errors_of_each(self, physics: np.ndarray) -> np.ndarray:
+        out = np.tile(self.noise, (len(physics), 1))
+        for effect, response in self.responses.items():
+            c = free(EV3, [effect]).coordinates[0]
+            values = physics[c.parameter.field] / c.parameter.si
+            sizes = [2.0 * round(0.5 * c.at(float(value))) for value in values]
+            out += response * (self.truth[effect] - np.array(sizes)[:, None])
+        return out
 
 
 @pytest.fixture(autouse=True)
@@ -322,6 +338,16 @@ def test_other_beginnings_are_tried_where_one_effect_leaves_much(
     assert [step.effect for step in explained.steps] == [VISCOUS]
     assert explained.unexplained == bool(size)
     assert begun == tried
+
+
+def test_after_each_stage_a_fit_is_searched_past_jumps() -> None:
+    size, begun = 6.0, 10.0
+    flat = linear({BACKLASH: size}, {BACKLASH: bumps(1, 4, 1.0)})
+    problem = linear_problem(TerracedResiduals(flat.responses, flat.truth, flat.noise, flat.count))
+    unit = BY_ID[BACKLASH].parameters[0].worthwhile
+    stuck = problem.estimator.fit((BACKLASH,), {BACKLASH: {"angle_deg": begun * unit}})
+    assert stuck.z == pytest.approx([begun])
+    assert stepwise._refitted(problem, stuck).z == pytest.approx([size], abs=1.0)
 
 
 def test_an_alternative_is_judged_by_what_it_would_leave() -> None:

@@ -334,11 +334,11 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Cha
 
 
 def _refitted(problem: Problem, model: Model) -> Model:
-    """Fit a model once more; on a bench with other constants if one is at a bound, and past jumps by a search."""
+    """Fit a model once more, and past jumps by a search; on a bench with other constants if one is at a bound."""
     model = problem.estimator.fit(model.effects, model.values)
     if problem.on_bench and at_a_bound(model):
         model = with_constants(problem, model)
-    if not (problem.on_bench and any(BY_ID[effect].search for effect in model.effects)):
+    if not any(BY_ID[effect].search for effect in model.effects):
         return model
     found = problem.estimator.searched(model, 1.0)
     return min(found, problem.estimator.fit(found.effects, found.values), key=lambda m: m.cost)
