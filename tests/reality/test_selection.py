@@ -340,6 +340,23 @@ def test_other_beginnings_are_tried_where_one_effect_leaves_much(
     assert begun == tried
 
 
+def test_where_another_beginning_comes_to_the_camera_s_clocks_all_begins_anew_with_these_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alike = {**RESPONSES, INERTIA: RESPONSES[VISCOUS] + 0.5 * RESPONSES[INERTIA]}
+    filmed = linear_problem(linear({VISCOUS: 8.0}, alike))
+    late = replace(filmed.residuals, noise=filmed.residuals.noise + unlike(RESPONSES[VISCOUS], 9, 6.0))  # type: ignore[type-var]
+
+    def with_camera(problem: Problem, model: Model, stage: object) -> Problem | None:
+        return filmed if INERTIA in model.effects else None
+
+    monkeypatch.setattr(stepwise, "_with_camera", with_camera)
+    explained = explain(linear_problem(late))  # type: ignore[arg-type]
+    assert explained.problem.residuals is filmed.residuals
+    assert [step.effect for step in explained.steps] == [VISCOUS]
+    assert not explained.unexplained
+
+
 def test_after_each_stage_a_fit_is_searched_past_jumps() -> None:
     size, begun = 6.0, 10.0
     flat = linear({BACKLASH: size}, {BACKLASH: bumps(1, 4, 1.0)})

@@ -99,14 +99,10 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     first = candidate_steps(known, known.known)
     if problem.on_bench:
         return _explain_motor(known, first)
-    with_camera = _with_camera(known, known.known, first)
+    chains, with_camera = _chains(known, first, once_more)
     if with_camera is not None:
         return explain(with_camera, once_more)
-    chain = _forward(known, _Chain((), known.known, ()), first)
-    if chain.with_camera is not None:
-        return explain(chain.with_camera, once_more)
-    others = [] if once_more else _other_beginnings(known, first, chain)
-    best = _best_chain(problem, [chain, *others])
+    best = _best_chain(problem, chains)
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     late = _with_late_clock(problem, model)
@@ -116,6 +112,25 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     if renewed is not None:
         return explain(renewed, once_more=True)
     return concluded(problem, model, steps, tried)
+
+
+def _chains(known: Problem, first: Sequence[Step], once_more: bool) -> tuple[list[_Chain], Problem | None]:
+    """Return the chains that begin at the first stage; or the problem to begin anew, with the camera fitted.
+
+    That is where clocks or mark explain as much as the best effect of a stage; of another beginning's stages, where the
+    first chain leaves more than is material.
+    """
+    with_camera = _with_camera(known, known.known, first)
+    if with_camera is not None:
+        return [], with_camera
+    chain = _forward(known, _Chain((), known.known, ()), first)
+    if once_more or chain.with_camera is not None:
+        return [chain], chain.with_camera
+    others = _other_beginnings(known, first, chain)
+    filmed = [other.with_camera for other in others if other.with_camera is not None]
+    if filmed and _leaves_much(known, chain.model):
+        return [], filmed[0]
+    return [chain, *(other for other in others if other.with_camera is None)], None
 
 
 def _explain_motor(problem: Problem, first: Sequence[Step]) -> Explanation:
@@ -371,11 +386,15 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
         return []
     firsts = competing(first)[:BEGINNINGS]
     if not chain.steps:
-        pairs = (_beginning_with(problem, first, step) for step in firsts)
-        return [pair for pair in pairs if len(pair.steps) > 1 and not _leaves_much(problem, pair.model)]
+        pairs = [_beginning_with(problem, first, step) for step in firsts]
+        return [
+            pair
+            for pair in pairs
+            if pair.with_camera is not None or (len(pair.steps) > 1 and not _leaves_much(problem, pair.model))
+        ]
     runners_up = [step for step in firsts if step is not first[0] and not stopped(step)]
     chains = [_forward(problem, _Chain((), problem.known, ()), [step], chain) for step in runners_up]
-    return [other for other in chains if other is not chain and other.with_camera is None]
+    return [other for other in chains if other is not chain]
 
 
 def _leaves_much(problem: Problem, model: Model) -> bool:
