@@ -144,7 +144,7 @@ def _left_out(explained: Explanation, step: Step, without: Model) -> tuple[Step,
     shown = np.flatnonzero(np.bincount(problem.parts, _shown(explained, without)) >= LEAST_SHOWN)
     if len(shown) < 2:
         return step, UNSEEN
-    if len(problem.recordings) == 1:
+    if problem.is_only_one:
         here = problem.estimator
         errors = [refitted_errors(here, here.at(model, model.z)) for model in (without, with_it)]
         return _asked_for(step, here.residuals.index, errors[:1], errors[1])

@@ -125,7 +125,7 @@ class Problem:
     def parts(self) -> npt.NDArray[np.int32]:
         """The recording of each residual, or its third of the only one, shape (n,): parts confirm what others show."""
         index = self.residuals.index
-        return index.recording if len(self.recordings) > 1 else self.estimator.blocks.folds
+        return self.estimator.blocks.folds if self.is_only_one else index.recording
 
     def without(self, number: int) -> tuple[Problem, Residuals]:
         """Return the problem without one recording, and that recording's residuals."""
