@@ -14,8 +14,10 @@ from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
 from gecar.reality.noise.sensor_noise import estimate_noise
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
+from gecar.reality.selection.problem import Problem
 from gecar.reality.verdict import Verdict
 from gecar.world.course.course import load_course
+from gecar.world.effects import CATALOGUE
 from gecar.world.robot import Robot
 
 
@@ -121,9 +123,32 @@ def test_an_offset_that_clips_black_is_not_told_as_a_gain() -> None:
     assert found["offset_pct"].low < -6.0 < found["offset_pct"].high
 
 
-def seen_on_the_course(seed: int, robot: Robot) -> Recording:
-    """Let a robot's colour sensor look at the paper's course on its way, with 0.8 % of noise, in whole percent."""
-    run = recorded(EV3, seed)
+@pytest.mark.parametrize("bumped", [False, True])
+def test_a_line_lies_elsewhere_beside_unexplained_motion_only_if_it_does_in_all_recordings(
+    monkeypatch: pytest.MonkeyPatch, bumped: bool
+) -> None:
+    shifted = EV3.with_effects({"line_shift": {"dx_m": 0.0, "dy_m": 0.02, "angle_rad": 0.0}})
+    slow = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.001}})
+    runs = [seen_on_the_course(seed, EV3 if bumped else shifted, slow, -0.3) for seed in (1, 2, 3, 5)]
+    if bumped:  # the camera's frame lies elsewhere in each recording
+        rng = np.random.default_rng(0)
+        runs = [
+            replace(run, x_m=run.x_m + rng.normal(0, 0.02), y_m=run.y_m + rng.normal(0, 0.02)) for run in runs
+        ]
+    monkeypatch.setattr(Problem, "with_clocks", lambda *_: None)
+    catalogue = [effect for effect in CATALOGUE if effect.id in ("line_shift", "sensor_delay", "spot_size")]
+    verdict = discover(Case("made", tuple(runs)), catalogue=catalogue)
+    assert verdict.residual.material
+    assert ("line_shift" in {f.id for f in verdict.effects}) is not bumped
+
+
+def seen_on_the_course(seed: int, robot: Robot, moved: Robot = EV3, up_m: float = 0.0) -> Recording:
+    """Let a robot's colour sensor look at the paper's course on its way, with 0.8 % of noise, in whole percent.
+
+    The way is that of another robot, ``up_m`` farther up.
+    """
+    run = recorded(moved, seed)
+    run = replace(run, y_m=run.y_m + up_m)
     run = replace(run, setup=replace(run.setup, course="paper"))
     run = replace(run, reflection_pct=np.zeros(len(run.t_s)))
     beside = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, load_course("paper"))
