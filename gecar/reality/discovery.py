@@ -410,12 +410,12 @@ def _explain_sensor(
     # if that explains nearly all, and is the same in all recordings.
     if motion.unexplained or context.material.times(motion.left) > 1.0:
         language = context.language and elsewhere(context.language, OF_THE_MOUNT)
-        context = replace(context, language=language)
-        if _of_place(seen) != _of_place(standing_out(seen)):
+        context, stands = replace(context, language=language), standing_out(seen)
+        if _of_place(seen) != _of_place(stands):
             anywhere = tuple(effect for effect in problem.catalogue if "pose" not in BY_ID[effect].needs)
             seen = _readings_explained(replace(problem, catalogue=anywhere), beside)
-    if motion.unexplained:
-        seen = standing_out(seen)
+            stands = standing_out(seen)
+        seen = stands if motion.unexplained else seen
     return _with_laws(context, _with_intervals(context, seen, beside))
 
 
