@@ -54,13 +54,12 @@ class TerracedResiduals(LinearResiduals):
     """Residuals that change only at every second size: derivatives say nothing."""
 
     def errors_of_each(self, physics: np.ndarray) -> np.ndarray:
-        out = np.tile(self.noise, (len(physics), 1))
-        for effect, response in self.responses.items():
+        levelled = physics.copy()
+        for effect in self.responses:
             c = free(EV3, [effect]).coordinates[0]
-            values = physics[c.parameter.field] / c.parameter.si
-            sizes = [2.0 * round(0.5 * c.at(float(value))) for value in values]
-            out += response * (self.truth[effect] - np.array(sizes)[:, None])
-        return out
+            height = 2.0 * c.step * c.parameter.si
+            levelled[c.parameter.field] = height * np.round(physics[c.parameter.field] / height)
+        return super().errors_of_each(levelled)
 
 
 @pytest.fixture(autouse=True)

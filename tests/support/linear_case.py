@@ -87,7 +87,7 @@ class LinearResiduals:
         out = np.tile(self.noise, (len(physics), 1))
         for effect, response in self.responses.items():
             c = free(EV3, [effect]).coordinates[0]
-            for row, value in enumerate(physics[c.parameter.field]):
+            for row, value in enumerate(physics[c.parameter.field] / c.parameter.si):
                 out[row] += response * (self.truth.get(effect, 0.0) - c.at(float(value)))
         return out
 
