@@ -256,7 +256,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
 def _with_logs_repaired(
     context: _Context, noise: Noise, threads: Threads
 ) -> tuple[Split, Problem, Residuals, Confirmation]:
-    """Repair the logs and explain the motion by effects; again where the robot found repairs the logs otherwise.
+    """Repair the logs and explain the motion by effects; repeat it if the robot found repairs the logs differently.
 
     When a command changed in a gap of a log is told by how a robot moves; the known robot tells it so that what it
     lacks is made up for in part. Returns the repaired recordings, the problem, held-out residuals, and what was seen.
@@ -420,14 +420,14 @@ def _explain_sensor(
 
 
 def _readings_explained(problem: Problem, held: Residuals) -> Confirmation:
-    """Explain readings by effects that those set aside confirm, and that make these as a whole no worse."""
+    """Explain sensor readings by effects that the readings set aside confirm, and that do not make those worse."""
     seen = explained_and_confirmed(problem, held)
     taken = with_gain_from_even_floor(seen.explained.problem.estimator, seen.explained.taken)
     return with_better_readings(replace(seen, explained=replace(seen.explained, taken=taken)), held)
 
 
 def _of_place(seen: Confirmation) -> set[str]:
-    """Return the effects found that only a known path tells."""
+    """Return which of the effects that were seen need a known path."""
     return {step.effect for step in seen.explained.steps if "pose" in BY_ID[step.effect].needs}
 
 

@@ -115,10 +115,10 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
 
 
 def _chains(known: Problem, first: Sequence[Step], once_more: bool) -> tuple[list[_Chain], Problem | None]:
-    """Return the chains that begin at the first stage; or the problem to begin anew, with the camera fitted.
+    """Return the chains to choose from, or the problem to start over with, the camera's clocks or mark fitted.
 
-    That is where clocks or mark explain as much as the best effect of a stage; of another beginning's stages, where the
-    first chain leaves more than is material.
+    It starts over where these explain as much as the best effect of a stage. Where that happens in a chain with another
+    beginning, it does so only if the first chain leaves more than is material.
     """
     with_camera = _with_camera(known, known.known, first)
     if with_camera is not None:
@@ -195,7 +195,7 @@ def concluded(
 
 
 def resumed(problem: Problem, found: Explanation, rivals: Sequence[Sequence[Step]] = ()) -> Explanation:
-    """Explain residuals by effects found before in similar ones, small effects too; each is judged beside the others.
+    """Explain residuals by the effects, small ones too, found before in similar ones; judge each beside the others.
 
     ``rivals`` are the stages whose runners-up are tried in their place.
     """
@@ -349,7 +349,7 @@ def _forward(problem: Problem, begun: _Chain, first: Sequence[Step], other: _Cha
 
 
 def _refitted(problem: Problem, model: Model) -> Model:
-    """Fit a model once more, and past jumps by a search; on a bench with other constants if one is at a bound."""
+    """Fit a model again, then search past jumps; on a bench, choose its constants anew if one is at a bound."""
     model = problem.estimator.fit(model.effects, model.values)
     if problem.on_bench and at_a_bound(model):
         model = with_constants(problem, model)
@@ -380,7 +380,8 @@ def _other_beginnings(problem: Problem, first: Sequence[Step], chain: _Chain) ->
 
     From runners-up, too, where it took only one, and leaves more than is material: that may be like one of two, and
     hide the other. Where it took none, and leaves as much, what fits best may be stopped by a bound, or make whole
-    drives worse, for it stands in for two. Those leave no more than is material: what imitates is stopped, too.
+    drives worse, for it stands in for two. Those leave no more than is material: what imitates is stopped, too. Chains
+    that come to the camera's clocks or mark are all among them.
     """
     if len(chain.steps) < 2 and not _leaves_much(problem, chain.model):
         return []
