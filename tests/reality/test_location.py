@@ -91,10 +91,15 @@ def test_a_recording_set_aside_is_pointed_at_where_it_shows_most() -> None:
     assert verdict.located[0].recording == "run_3"
 
 
-@pytest.mark.parametrize("missing", [(), ("left_angle_rad", "right_angle_rad")])
-def test_a_ripple_is_found_whatever_the_phases_of_the_two_motors(missing: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("cycles_per_rev", "missing"), [(7.0, ()), (6.0, ("left_angle_rad", "right_angle_rad"))]
+)
+def test_a_ripple_is_found_whatever_the_phases_of_the_two_motors(
+    cycles_per_rev: float, missing: tuple[str, ...]
+) -> None:
     phases = {"phase_rad": -1.55, "right_lead_rad": 0.47}
-    robot = EV3.with_effects({"torque_ripple": {"amplitude_nm": 0.036, "cycles_per_rev": 6.0, **phases}})
+    ripple = {"amplitude_nm": 0.036, "cycles_per_rev": cycles_per_rev, **phases}
+    robot = EV3.with_effects({"torque_ripple": ripple})
     verdict = found_in(robot, *missing)
     if missing:  # a camera alone tells no cycles for sure: it may abstain, and names nothing else
         assert verdict.verdict != "nothing"
@@ -102,7 +107,7 @@ def test_a_ripple_is_found_whatever_the_phases_of_the_two_motors(missing: tuple[
         return
     assert [f.id for f in verdict.effects] == ["torque_ripple"]
     cycles = verdict.effects[0].parameters["cycles_per_rev"]
-    assert cycles.low < 6.0 < cycles.high
+    assert cycles.low < cycles_per_rev < cycles.high
 
 
 def test_a_patch_smaller_than_a_robot_is_found() -> None:

@@ -37,7 +37,8 @@ _TIMES = (
     12.0,
 )  # of what moves commands against steps: fits of it end at the next small dip
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
-CYCLES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 42, 48)
+CYCLES = (*range(1, 25), 30, 36, 42, 48)  # a fit moves them by hundredths only; fast ones are hardly seen
+BEST_CYCLES = 8
 PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
 PATCH_RADII_M = (0.07, 0.1, 0.15, 0.2, 0.3)
 SCANNED_RADIUS_M = 0.1
@@ -142,17 +143,25 @@ def _shaft_cycles(robot: Robot, recordings: Sequence[Recording], errors: Errors)
     """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
 
     Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
-    either shaft do, and least squares gives both phases at once.
+    either shaft do, and least squares gives both phases at once, and which cycles are worth trying.
     """
     bare = _unrippled(errors)
     w, least = np.sqrt(weights(bare)), cost(bare)
-    tried = []
+    fits = []
     for cycles, size, basis in _ripples(robot, recordings, errors, bare):
-        a, b, c, d = -np.linalg.lstsq(w[:, None] * basis, w * bare, rcond=None)[0]
+        weighted = w[:, None] * basis
+        a, b, c, d = sines = -np.linalg.lstsq(weighted, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
         phases = (math.atan2(b, a), math.atan2(d, c)), (math.atan2(-b, -a), math.atan2(-d, -c))
-        # Least squares asks for too little: a ripple runs out of step with the simulation.
-        tried += [_rippled(cycles, *pair, share * most) for share in (1.0, 2.0, 4.0) for pair in phases]
+        fits.append((float(np.linalg.norm(weighted @ sines)), cycles, phases, most))
+    fits.sort(reverse=True)
+    # Least squares asks for too little: a ripple runs out of step with the simulation.
+    tried = [
+        _rippled(cycles, *pair, share * most)
+        for _, cycles, phases, most in fits[:BEST_CYCLES]
+        for share in (1.0, 2.0, 4.0)
+        for pair in phases
+    ]
     gains = least - cost_of_each(errors, tried)
     for found, gain, opposite in zip(tried[::2], gains[::2], gains[1::2], strict=True):
         if opposite < PHASE_COUNTS * gain:
@@ -172,11 +181,7 @@ def ripple_responses(robot: Robot, recordings: Sequence[Recording], errors: Erro
 
 
 def _ripples(
-    robot: Robot,
-    recordings: Sequence[Recording],
-    errors: Errors,
-    bare: Array,
-    scanned: Sequence[int] = CYCLES,
+    robot: Robot, recordings: Sequence[Recording], errors: Errors, bare: Array
 ) -> Iterator[tuple[int, float, Array]]:
     """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
     turned = max(_turned(r, robot) for r in recordings)
