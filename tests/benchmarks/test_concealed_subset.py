@@ -30,7 +30,8 @@ def test_nothing_concealed_is_given_no_name(tmp_path, monkeypatch):
     assert examined("none", (), 1, tmp_path).named == ()
 
 
-def test_concealed_effect_is_named_alone_and_located(tmp_path):
+def test_concealed_effect_is_named_alone_and_located(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "RUNS", FEW)
     judged = examined("single", ("motor_gain_asymmetry",), 1, tmp_path)
     assert judged.exact
     assert judged.channel_right

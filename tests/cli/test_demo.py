@@ -11,7 +11,7 @@ from support.command import call
 from gecar.cli.actions import demo
 
 # Fewer generations, drives and exercises than the command's own, and the same stages.
-QUICK = ("--generations", "4", "--quiet", "--json", "--out", "shown")
+QUICK = ("--generations", "2", "--quiet", "--json", "--out", "shown")
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ from gecar.reality.start_pose.localise import (
     with_other_wheels,
 )
 from gecar.world.course.course import load_course
+from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
 PAPER = load_course("paper")
@@ -91,8 +92,10 @@ def test_a_start_is_found_though_the_sensor_is_mounted_elsewhere_and_late(source
 
 
 def test_two_robots_are_judged_from_one_start() -> None:
-    runs = (replace(run, reflection_pct=np.round(0.9 * run.reflection_pct)) for run in blind(EV3).recordings)
-    verdict = discover(Case("made", tuple(runs)))
+    runs = (
+        replace(run, reflection_pct=np.round(0.9 * run.reflection_pct)) for run in blind(EV3, 3).recordings
+    )
+    verdict = discover(Case("made", tuple(runs)), catalogue=[BY_ID["sensor_gain"]])
     assert [f.id for f in verdict.effects] == ["sensor_gain"]
     starts = [
         [run.nuisances.start for run in held.recordings]
