@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 from support.concealing import EV3
@@ -23,6 +24,25 @@ NOISE = estimate_noise(RUNS, EV3.physics, 1.0)
 
 def contender(robot: Robot, runs: Sequence[Recording] = RUNS) -> Contender:
     return Contender(robot, motion_residuals(runs, NOISE, 1.0, Threads(1)).with_paths(robot.physics))
+
+
+@pytest.mark.parametrize(
+    ("lines", "held"),
+    [
+        ("01", "0"),
+        ("10", "1"),
+        ("010", "2"),
+        ("001", "1"),
+        ("1111", "3"),
+        ("0001", "2"),
+        ("00100010", "37"),
+        ("00010001", "26"),
+    ],
+)
+def test_a_recording_that_reads_the_line_is_fitted_on_where_there_is_one(lines: str, held: str) -> None:
+    """``lines`` are recordings in order, 1 where one crosses the line; ``held`` those set aside."""
+    runs = tuple(replace(RUNS[int(crossed)], name=str(number)) for number, crossed in enumerate(lines))
+    assert "".join(run.name for run in hold_out(Case("made", runs)).held) == held
 
 
 def test_readings_depend_on_the_path_a_robot_gives() -> None:

@@ -15,6 +15,7 @@ from gecar.reality.recordings.recording import Case, Recording
 EVERY = 4  # one recording in so many is set aside
 FIRST_SHARE = 0.7  # of a single recording's time is fitted on
 ENOUGH_S = 100.0  # of drives to fit on: more makes fits slower, and proves less than as many drives set aside
+LINE_PCT = 30.0  # what readings differ by where a line was crossed, at least; on bare floor it is a few
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 LEAST = 6  # drives, however long: each is left out in turn
 
@@ -42,7 +43,8 @@ class Split:
 def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
     """Set recordings aside: those named, or every fourth counted from the last, or the end of the only one.
 
-    The beginning of a name is enough where no other begins so.
+    The count begins earlier where otherwise no recording that reads the line would be fitted on. The beginning of a
+    name is enough where no other begins so.
 
     Raises
     ------
@@ -54,11 +56,26 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
     if not wanted and len(known) == 1:
         return _by_time(case.recordings[0])
     if not wanted:
-        wanted = set(known[::-1][::EVERY]) if len(known) >= EVERY else {known[-1]}
+        wanted = _every_fourth(case.recordings)
     fitted = tuple(r for r in case.recordings if r.name not in wanted)
     if not fitted:
         raise expected("--holdout", "all recordings", "at least one left to fit on")
     return Split(fitted, tuple(r for r in case.recordings if r.name in wanted))
+
+
+def _every_fourth(recordings: Sequence[Recording]) -> set[str]:
+    """Return the names of every fourth recording from the last, or of one of fewer, so that one of a line is left."""
+    from_last, every = recordings[::-1], min(EVERY, len(recordings))
+    choices = [from_last[first::every] for first in range(every)]
+    lines = [r.name for r in recordings if _reads_a_line(r)]
+    held = ({r.name for r in choice} for choice in choices)
+    return next((names for names in held if not names.issuperset(lines)), {r.name for r in choices[0]})
+
+
+def _reads_a_line(recording: Recording) -> bool:
+    """Whether its colour sensor saw light and dark."""
+    seen = recording.reflection_pct[~np.isnan(recording.reflection_pct)]
+    return bool(np.ptp(seen) > LINE_PCT) if len(seen) else False
 
 
 def with_enough(split: Split) -> Split:
