@@ -51,7 +51,14 @@ from gecar.reality.selection.acceptance import size_of, stands_out, worsens
 from gecar.reality.selection.alternatives import alternatives, late_as_well
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
-from gecar.reality.selection.stepwise import Explanation, explain, left_before, left_share, resumed
+from gecar.reality.selection.stepwise import (
+    Explanation,
+    explain,
+    left_before,
+    left_share,
+    likeliest,
+    resumed,
+)
 from gecar.reality.selection.thresholds import NEGLIGIBLE, PRICE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import hulls, intervals, weakest_absent
 from gecar.reality.uncertainty.limits import limits
@@ -259,14 +266,17 @@ def _with_logs_repaired(
     """Repair the logs and explain the motion by effects; repeat it if the robot found repairs the logs differently.
 
     When a command changed in a gap of a log is told by how a robot moves; the known robot tells it so that what it
-    lacks is made up for in part. Returns the repaired recordings, the problem, held-out residuals, and what was seen.
+    lacks is made up for in part, and one found in part may do so again: the likeliest of all repairs is taken. Returns
+    the repaired recordings, the problem, held-out residuals, and what was seen.
     """
     split = _without_log_faults(context.split, context.robot.physics, noise, threads)
     fitted, held = _residuals(split, noise, threads)
     before: Confirmation | None = None
+    repaired: list[tuple[Split, Problem, Residuals, Confirmation]] = []
     for number in range(REPAIRS):
         problem = _problem(context, context.robot, fitted, held)
         seen = (before and _once_more(problem, held, before)) or explained_and_confirmed(problem, held)
+        repaired.append((split, problem, held, seen))
         physics = seen.explained.problem.with_small_changes(seen.explained.taken)
         again = _without_log_faults(context.split, physics, noise, threads)
         told = _residuals(again, noise, threads)
@@ -275,7 +285,10 @@ def _with_logs_repaired(
             break
         context.tell("once more, with gaps of the logs as the robot that was found tells them")
         split, (fitted, held), before = again, told, seen
-    return split, problem, held, seen
+    if len(repaired) == 1:
+        return repaired[0]
+    explained = [each.explained for *_, each in repaired]
+    return repaired[likeliest([(each.problem, each.taken) for each in explained])]
 
 
 def _once_more(problem: Problem, held: Residuals, before: Confirmation) -> Confirmation | None:

@@ -28,7 +28,7 @@ from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
-from gecar.reality.selection.stepwise import explain, resumed
+from gecar.reality.selection.stepwise import explain, likeliest, resumed
 from gecar.reality.selection.thresholds import PRICE, table
 from gecar.world.effects import BY_ID
 from gecar.world.rollout import STEP_S
@@ -441,6 +441,15 @@ def test_an_effect_that_gains_nothing_on_recordings_set_aside_is_a_candidate() -
     assert proof.explained.taken.effects == (TRACK,)
     assert proof.explained.unexplained
     assert proof.explained.steps[0].holdout_gain > 0.0
+
+
+def test_of_several_explanations_the_likeliest_costs_least_names_included() -> None:
+    problem = linear_problem(linear({VISCOUS: 3.0}, RESPONSES))
+    known, one, two = (problem.estimator.fit(e, {}) for e in ((), (VISCOUS,), (VISCOUS, TRACK)))
+    assert likeliest([(problem, model) for model in (known, two, one)]) == 2
+    # The same rows, repaired so that less is missing.
+    cleaner = linear_problem(linear({VISCOUS: 1.0}, RESPONSES))
+    assert likeliest([(problem, known), (cleaner, cleaner.known)]) == 1
 
 
 def set_aside(shares: list[float]) -> LinearResiduals:

@@ -102,7 +102,7 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     chains, with_camera = _chains(known, first, once_more)
     if with_camera is not None:
         return explain(with_camera, once_more)
-    best = _best_chain(problem, chains)
+    best = chains[likeliest([(problem, chain.model) for chain in chains])] if len(chains) > 1 else chains[0]
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     late = _with_late_clock(problem, model)
@@ -416,15 +416,18 @@ def _effects(steps: Sequence[Step]) -> set[str]:
     return {step.effect for step in steps}
 
 
-def _best_chain(problem: Problem, chains: Sequence[_Chain]) -> _Chain:
-    """Return the chain that costs least, names included, under the smallest discrepancy any of them leaves."""
-    if len(chains) == 1:
-        return chains[0]
-    spaces = [problem.under(chain.model, ()).estimator for chain in chains]
+def likeliest(found: Sequence[tuple[Problem, Model]]) -> int:
+    """Return which model costs least, names included, under the smallest discrepancy any of them leaves.
+
+    Each is judged on the residuals of its own problem: the same rows, the logs perhaps repaired differently.
+    """
+    spaces = [problem.under(model, ()).estimator for problem, model in found]
     under = min(spaces, key=lambda e: float(e.discrepancy.ratios.sum()) if e.discrepancy else 0.0)
-    return min(
-        chains, key=lambda c: under.cost_of(problem.residuals.errors(c.model.physics)) + PRICE * len(c.steps)
-    )
+    costs = [
+        under.cost_of(problem.residuals.errors(model.physics)) + PRICE * len(model.effects)
+        for problem, model in found
+    ]
+    return costs.index(min(costs))
 
 
 def _swapped_and_dropped(
