@@ -542,6 +542,26 @@ def test_what_takes_whole_drives_a_quarter_farther_off_is_a_candidate(
     assert bool(proof.candidates) != kept
 
 
+@pytest.mark.parametrize(
+    ("now", "share", "nearer", "helps"),
+    [
+        (1.6, Share(1.0, 0.98, 1.02), True, True),
+        (2.1, Share(1.0, 0.98, 1.02), True, False),
+        (1.6, Share(1.0, 0.9, 1.1), True, False),  # another size may be asked for
+        (1.6, Share(1.0, 0.98, 1.02), False, False),  # small changes do not make up for it
+    ],
+)
+def test_a_cause_exactly_asked_for_may_take_drives_farther_off_if_small_changes_make_up_for_it(
+    monkeypatch: pytest.MonkeyPatch, now: float, share: Share, nearer: bool, helps: bool
+) -> None:
+    """A battery's drain, of just the size that was asked for, took drives 1.6 times as far off as without it."""
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    (step,) = explained.steps
+    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, now))
+    monkeypatch.setattr(confirmation, "_is_main", lambda *_: nearer)
+    assert confirmation._helps(explained, set_aside([1.0]), step, step.base, share) == helps  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(("now", "kept"), [(0.78, True), (0.82, False)])
 def test_where_only_the_end_of_one_recording_is_set_aside_it_must_come_a_quarter_nearer(
     monkeypatch: pytest.MonkeyPatch, now: float, kept: bool
