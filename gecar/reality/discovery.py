@@ -16,7 +16,7 @@ import numpy.typing as npt
 from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
-from gecar.reality.advise.notes import notes_on_findings, notes_on_recordings
+from gecar.reality.advise.notes import note_on_astray, notes_on_findings, notes_on_recordings
 from gecar.reality.evidence import Evidence
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
@@ -55,6 +55,7 @@ from gecar.reality.selection.stepwise import (
     Explanation,
     explain,
     left_before,
+    left_by,
     left_share,
     likeliest,
     resumed,
@@ -88,6 +89,8 @@ FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wh
 # nothing material is left must leave so much less than there was.
 INSTEAD = 0.7
 REPAIRS = 3  # of logs, at most: by the known robot first, then by the one found
+# Times the material size, and what recordings fitted on leave, that one set aside must leave to be told of by itself.
+ASTRAY = 3.0
 OF_NO_MATTER = 0.2  # of the material size: a new repair that moves whole drives by less changes nothing
 
 
@@ -208,7 +211,8 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     )
     context.tell("alternatives, location")
     effects, rivals = _findings(context, stages)
-    unexplained = any(stage.explained.unexplained for stage in stages)
+    astray = _astray(motion, after.held)
+    unexplained = bool(astray) or any(stage.explained.unexplained for stage in stages)
     invented = tuple(law for stage in stages for law in stage.invented)
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), unexplained)
@@ -226,7 +230,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         invented=invented,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after), shows),
-        residual=_what_is_left(context, stages, fitted, after),
+        residual=_what_is_left(context, stages, fitted, after, [*astray.values()]),
         next_recording=suggest(
             found,
             effects,
@@ -247,6 +251,7 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             *notes_on_recordings(
                 split, context.split, fitted, motion.explained.problem.clocks_fitted, where.doubted
             ),
+            *map(note_on_astray, astray, astray.values()),
         ),
         evidence=Evidence(
             motion.explained,
@@ -657,10 +662,36 @@ def _located(
     )
 
 
+def _astray(motion: _Stage, held: Residuals) -> dict[str, Size]:
+    """Return how far off each recording is, set aside, that met what explained recordings did not: by its name.
+
+    Beside an effect at a place it may just have missed that place, slightly off its path.
+    """
+    explained, problem = motion.explained, motion.explained.problem
+    at_a_place = any(BY_ID[step.effect].at_a_place for step in explained.steps)
+    if explained.unexplained or at_a_place or problem.on_bench or problem.is_only_one:
+        return {}
+    left = {
+        run.recording.name: left_by(
+            replace(problem, sizes=replace(problem.sizes, runs=(run,))), explained.taken
+        )
+        for run in held.recordings
+    }
+    most = ASTRAY * max(_left(motion), 1.0)
+    return {name: size for name, size in left.items() if problem.material.times(size) > most}
+
+
 def _what_is_left(
-    context: _Context, stages: Sequence[_Stage], fitted: Residuals, found: Contender
+    context: _Context,
+    stages: Sequence[_Stage],
+    fitted: Residuals,
+    found: Contender,
+    astray: Sequence[Size],
 ) -> Residual:
-    """Return whether what is left is white, and formulas for what nothing explains."""
+    """Return whether what is left is white, and formulas for what nothing explains.
+
+    ``astray`` is how far off those recordings set aside are that met something else.
+    """
     parts = [stage.explained for stage in stages]
     # Of motion and readings, the smaller p-value counts, times their number (Bonferroni).
     p = min(1.0, len(parts) * min(whiteness(each.problem, each.taken, context.seed)[1] for each in parts))
@@ -668,13 +699,14 @@ def _what_is_left(
     if motion.unexplained:
         described = describe(fitted.recordings, motion.taken.physics, context.seed)
     gained = _with_formulas(found, described) if context.with_formula and described else None
-    white = p > SIGNIFICANCE and not any(each.unexplained for each in parts)
+    material = bool(astray) or any(each.unexplained for each in parts)
+    white = p > SIGNIFICANCE and not material
     apart = (
         context.robot.with_effects(v)
         for v in (motion.taken.values, motion.problem.small_changes(motion.taken))
     )
-    size = replace(combined([each.left for each in parts]), arrival_s=context.arrival_apart_s(*apart))
-    material = any(each.unexplained for each in parts)
+    left = combined([*(each.left for each in parts), *astray])
+    size = replace(left, arrival_s=context.arrival_apart_s(*apart))
     return Residual(white, p, size, material, "; ".join(map(str, described)) or None, gained)
 
 

@@ -183,6 +183,16 @@ def test_one_recording_is_split_by_time() -> None:
     assert np.flatnonzero(~np.isnan(parts.held[0].x_m[:100])).tolist() == [0]  # where the replay begins
 
 
+def test_a_recording_set_aside_that_met_something_else_is_told_of() -> None:
+    weak = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.003}})
+    runs = [replace(recorded(EV3, seed), name=f"run_{seed}") for seed in range(3)]
+    odd = replace(recorded(weak, 3), name="odd")
+    verdict = discover(Case("made", (*runs, odd)), ["odd"])
+    assert verdict.verdict == "unexplained"
+    assert verdict.residual.material
+    assert any(note.startswith("odd, which was held out, is off by") for note in verdict.notes)
+
+
 def test_of_many_drives_enough_are_fitted_and_the_others_set_aside() -> None:
     runs = tuple(replace(recorded(EV3, 1), name=f"run_{number:02}") for number in range(30))
     parts = with_enough(hold_out(Case("many", runs), ["run_29"]))

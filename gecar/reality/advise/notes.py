@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gecar.reality.fitting.model import Step
+from gecar.reality.materiality import Size
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.recordings.split import ENOUGH_S, Split
 from gecar.reality.residuals.of_case import Residuals
@@ -134,6 +135,15 @@ def notes_on_recordings(
             f"Start poses found from sensor readings, up to places that look the same: {'; '.join(located)}."
         )
     return tuple(notes)
+
+
+def note_on_astray(name: str, size: Size) -> str:
+    """Return a note on a recording set aside that met something which no recording fitted on did."""
+    return (
+        f"{name}, which was held out, is off by {size.mm_1m:.0f} mm and {size.deg_1m:.1f} degrees over a metre with all"
+        " that was found, and no recording fitted on is: it met something that those did not. Record more like it, or"
+        " hold out others (--holdout)."
+    )
 
 
 def _why_refused(candidate: Step) -> str:
