@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from support.linear_case import EV3, LinearResiduals, bumps, linear, linear_problem
+from support.linear_case import EV3, LinearResiduals, LinearSizes, bumps, linear, linear_problem
 
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
@@ -530,36 +530,26 @@ def test_a_place_on_the_floor_all_of_which_is_asked_for_stays_though_drives_end_
     assert bool(proof.explained.steps) == bool(scan)
 
 
-@pytest.mark.parametrize(("now", "kept"), [(1.2, True), (1.3, False)])
+@pytest.mark.parametrize(
+    ("now", "off_mm", "share", "kept"),
+    [
+        (1.2, 6.0, Share(1.0, 0.9, 1.1), True),
+        (1.3, 6.0, Share(1.0, 0.9, 1.1), False),
+        (4.0, 4.0, Share(1.0, 0.9, 1.1), True),  # but not by what is material
+        (4.0, 4.0, Share(0.8, 0.6, 1.0), False),  # not all of it is asked for
+    ],
+)
 def test_what_takes_whole_drives_a_quarter_farther_off_is_a_candidate(
-    monkeypatch: pytest.MonkeyPatch, now: float, kept: bool
+    monkeypatch: pytest.MonkeyPatch, now: float, off_mm: float, share: Share, kept: bool
 ) -> None:
     """Beside small changes that made up for it, tyres that resist turning asked for all of a caster's drag."""
     monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, now))
+    monkeypatch.setattr(LinearSizes, "left", lambda *_, **__: Size(mm_1m=off_mm))
+    monkeypatch.setattr(confirmation, "share_asked_for", lambda *_: share)
     explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
     proof = confirmed(explained, set_aside([1.0]))  # type: ignore[arg-type]
     assert bool(proof.explained.steps) == kept
     assert bool(proof.candidates) != kept
-
-
-@pytest.mark.parametrize(
-    ("now", "share", "nearer", "helps"),
-    [
-        (1.6, Share(1.0, 0.98, 1.02), True, True),
-        (2.1, Share(1.0, 0.98, 1.02), True, False),
-        (1.6, Share(1.0, 0.9, 1.1), True, False),  # another size may be asked for
-        (1.6, Share(1.0, 0.98, 1.02), False, False),  # small changes do not make up for it
-    ],
-)
-def test_a_cause_exactly_asked_for_may_take_drives_farther_off_if_small_changes_make_up_for_it(
-    monkeypatch: pytest.MonkeyPatch, now: float, share: Share, nearer: bool, helps: bool
-) -> None:
-    """A battery's drain, of just the size that was asked for, took drives 1.6 times as far off as without it."""
-    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
-    (step,) = explained.steps
-    monkeypatch.setattr(confirmation, "gaps", lambda *_: (1.0, now))
-    monkeypatch.setattr(confirmation, "_is_main", lambda *_: nearer)
-    assert confirmation._helps(explained, set_aside([1.0]), step, step.base, share) == helps  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("now", "kept"), [(0.78, True), (0.82, False)])

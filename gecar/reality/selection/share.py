@@ -33,7 +33,6 @@ AS_GOOD_WITHOUT = 0.5  # the share at which half squares are as large with an ef
 LEAST_CHANGE = 1.0  # squared standard deviations: recordings in which an effect does not show
 LEAST_SHOWN = 25.0  # the same: what shows an effect by itself
 WHOLLY = 0.25  # by which the bounds of a share may differ from 1 where all of an effect is asked for
-EXACTLY = 0.05  # the same where exactly its size is asked for
 ROUNDS, LARGEST_MOVE, CLOSE = 50, 0.5, 1e-6  # of Newton's iteration
 
 
@@ -54,11 +53,6 @@ class Share:
     def is_whole(self) -> bool:
         """Whether the recordings ask for the whole effect and no more: both bounds are within `WHOLLY` of 1."""
         return self.low > 1.0 - WHOLLY and self.high < 1.0 + WHOLLY
-
-    @property
-    def is_exact(self) -> bool:
-        """Whether the recordings ask for the effect in just the size that was fitted, to `EXACTLY`."""
-        return self.low > 1.0 - EXACTLY and self.high < 1.0 + EXACTLY
 
 
 UNSEEN = Share(0.0, -np.inf, np.inf)  # recordings that do not show an effect ask for any share
