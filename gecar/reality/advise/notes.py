@@ -138,7 +138,7 @@ def notes_on_recordings(
 
 
 def note_on_astray(name: str, size: Size) -> str:
-    """Return a note on a recording set aside that met something which no recording fitted on did."""
+    """Return a note on a held-out recording that shows something no fitted recording shows."""
     return (
         f"{name}, which was held out, is off by {size.mm_1m:.0f} mm and {size.deg_1m:.1f} degrees over a metre with all"
         " that was found, and no recording fitted on is: it met something that those did not. Record more like it, or"

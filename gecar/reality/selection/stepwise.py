@@ -195,7 +195,7 @@ def concluded(
 
 
 def resumed(problem: Problem, found: Explanation, rivals: Sequence[Sequence[Step]] = ()) -> Explanation:
-    """Explain residuals by the effects, small ones too, found before in similar ones; judge each beside the others.
+    """Explain residuals with the effects found before in similar ones, small effects included; judge each anew.
 
     ``rivals`` are the stages whose runners-up are tried in their place.
     """
