@@ -212,10 +212,10 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     context.tell("alternatives, location")
     effects, rivals = _findings(context, stages)
     astray = _astray(motion, after.held)
-    unexplained = bool(astray) or any(stage.explained.unexplained for stage in stages)
+    left = _what_is_left(context, stages, fitted, after, [*astray.values()])
     invented = tuple(law for stage in stages for law in stage.invented)
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
-    word = _word(bool(effects), bool(invented), unexplained)
+    word = _word(bool(effects), bool(invented), left.material)
     unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
     candidates = [step for stage in stages for step in stage.candidates]
     nothing = not (effects or invented)
@@ -230,13 +230,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         invented=invented,
         located=where.places(np.random.default_rng(context.seed)) if word != "nothing" else (),
         judgement=Judgement(tuple(r.name for r in split.held), split.by_time, judge(before, after), shows),
-        residual=_what_is_left(context, stages, fitted, after, [*astray.values()]),
+        residual=left,
         next_recording=suggest(
             found,
             effects,
             rivals,
             fitted.recordings[0],
-            unexplained,
+            left.material,
             invented,
             seen_from,
             context.about,
@@ -290,8 +290,6 @@ def _with_logs_repaired(
             break
         context.tell("once more, with gaps of the logs as the robot that was found tells them")
         split, (fitted, held), before = again, told, seen
-    if len(repaired) == 1:
-        return repaired[0]
     explained = [each.explained for *_, each in repaired]
     return repaired[likeliest([(each.problem, each.taken) for each in explained])]
 
@@ -663,7 +661,7 @@ def _located(
 
 
 def _astray(motion: _Stage, held: Residuals) -> dict[str, Size]:
-    """Return how far off each recording is, set aside, that met what explained recordings did not: by its name.
+    """Return the remaining error of each held-out recording that shows something no fitted recording shows, by name.
 
     Beside an effect at a place it may just have missed that place, slightly off its path.
     """
@@ -688,9 +686,9 @@ def _what_is_left(
     found: Contender,
     astray: Sequence[Size],
 ) -> Residual:
-    """Return whether what is left is white, and formulas for what nothing explains.
+    """Return the size of the remaining error, whether it is white noise, and formulas for what nothing explains.
 
-    ``astray`` is how far off those recordings set aside are that met something else.
+    ``astray`` are the errors of held-out recordings that show something else (`_astray`).
     """
     parts = [stage.explained for stage in stages]
     # Of motion and readings, the smaller p-value counts, times their number (Bonferroni).

@@ -189,19 +189,23 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     was, now = _gaps(problem, without, explained.taken, held)
-    worse, continues = worsens(problem, without, explained.taken, sizes), _continues(held, problem.residuals)
+    whole_drives = problem, without, explained.taken, sizes
+    continues = _continues(held, problem.residuals)
     most = was / WORSE if continues else WORSE * was
     if now > most and not (held.sensor or problem.on_bench):
-        left = problem.material.times(sizes.left(explained.taken.physics))
-        return share.is_whole and not (worse or continues) and left < 1.0
+        if continues or not share.is_whole:
+            return False
+        return problem.material.times(sizes.left(explained.taken.physics)) < 1.0 and not worsens(
+            *whole_drives
+        )
     if not explained.unexplained or share.is_whole:
-        return not worse or (share.is_whole and now < was)
+        return not worsens(*whole_drives) or (share.is_whole and now < was)
     beside = (problem.with_small_changes(model, explained.taken) for model in (explained.taken, without))
     left, before = (problem.material.times(sizes.left(physics)) for physics in beside)
     if left**2 < (1.0 - MAIN_SHARE) * before**2:
         return True
     is_steady = share.low < 1.0 < share.high and stands_out(problem, step)
-    return now < was and is_steady and not worse
+    return now < was and is_steady and not worsens(*whole_drives)
 
 
 def _continues(held: Residuals, fitted: Residuals) -> bool:

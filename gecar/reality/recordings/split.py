@@ -64,16 +64,15 @@ def hold_out(case: Case, names: Sequence[str] = ()) -> Split:
 
 
 def _every_fourth(recordings: Sequence[Recording]) -> set[str]:
-    """Return the names of every fourth recording from the last, or of one of fewer, so that one of a line is left."""
-    from_last, every = recordings[::-1], min(EVERY, len(recordings))
-    choices = [from_last[first::every] for first in range(every)]
-    lines = [r.name for r in recordings if _reads_a_line(r)]
-    held = ({r.name for r in choice} for choice in choices)
-    return next((names for names in held if not names.issuperset(lines)), {r.name for r in choices[0]})
+    """Return the names of the recordings to hold out: every fourth counted from the last, or one of fewer."""
+    names, every = [r.name for r in recordings[::-1]], min(EVERY, len(recordings))
+    choices = [set(names[first::every]) for first in range(every)]
+    lines = {r.name for r in recordings if _reads_a_line(r)}
+    return next((held for held in choices if not lines <= held), choices[0])
 
 
 def _reads_a_line(recording: Recording) -> bool:
-    """Whether its colour sensor saw light and dark."""
+    """Whether the colour sensor saw both the line and bare floor."""
     seen = recording.reflection_pct[~np.isnan(recording.reflection_pct)]
     return bool(np.ptp(seen) > LINE_PCT) if len(seen) else False
 

@@ -102,7 +102,7 @@ def explain(problem: Problem, once_more: bool = False) -> Explanation:
     chains, with_camera = _chains(known, first, once_more)
     if with_camera is not None:
         return explain(with_camera, once_more)
-    best = chains[likeliest([(problem, chain.model) for chain in chains])] if len(chains) > 1 else chains[0]
+    best = chains[likeliest([(problem, chain.model) for chain in chains])]
     tried = (tuple(first), *best.tried[1:])
     model, steps = _swapped_and_dropped(problem, best, tried)
     late = _with_late_clock(problem, model)
@@ -417,10 +417,13 @@ def _effects(steps: Sequence[Step]) -> set[str]:
 
 
 def likeliest(found: Sequence[tuple[Problem, Model]]) -> int:
-    """Return which model costs least, names included, under the smallest discrepancy any of them leaves.
+    """Return the index of the model that costs least, including the price of its names.
 
-    Each is judged on the residuals of its own problem: the same rows, the logs perhaps repaired differently.
+    All are judged under the smallest discrepancy that any of them leaves, each on the residuals of its own problem: the
+    same rows, the logs perhaps repaired differently.
     """
+    if len(found) == 1:
+        return 0
     spaces = [problem.under(model, ()).estimator for problem, model in found]
     under = min(spaces, key=lambda e: float(e.discrepancy.ratios.sum()) if e.discrepancy else 0.0)
     costs = [
