@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 from support.concealing import motion_of, recorded
 from support.linear_case import EV3, bumps, linear, linear_problem
@@ -64,6 +65,18 @@ def test_small_changes_are_told_within_their_bounds() -> None:
     kept = made.small_changes(errors, np.full(4, -1.0), np.array([1.0, 0.0, 1.0, 1.0]))
     assert kept[3] == pytest.approx(1.0)
     assert np.all(kept <= [1.0, 1e-9, 1.0, 1.0])
+
+
+def test_small_changes_without_bounds_are_solved_for_beside_those_of_parameters() -> None:
+    errors = np.random.default_rng(1).normal(size=len(SLOPES)) - SLOPES @ np.array([0.4, -3.0, 0.3, 0.6])
+    made = discrepancy(SLOPES, errors, BLOCKS, INDEX.channel, *SIZES[:2], 2)
+    found = made.small_changes(errors, np.full(2, -1.0), np.full(2, 1.0))
+    rows = np.vstack([made.spread[:, None] * made.back, np.eye(4)])
+    inside = (errors * made.scale * made.root_weight) @ made.basis
+    bounds = np.array([1.0, 1.0, np.inf, np.inf]) / made.small
+    whole = lsq_linear(rows, -np.r_[inside, np.zeros(4)], (-bounds, bounds), "bvls").x * made.small
+    assert found == pytest.approx(whole[:2], abs=1e-6)
+    assert found[1] == -1.0
 
 
 def test_physics_in_no_list_makes_a_channel_as_noisy_as_it_leaves_it() -> None:

@@ -20,10 +20,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from gecar.reality.noise.excess_energy import Blocks
@@ -31,7 +32,6 @@ from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.replay.channels import CHANNELS
 
 Array = npt.NDArray[np.float64]
-Method = Literal["trf", "bvls"]
 Single = npt.NDArray[np.float32]
 
 ROUNDS = 3  # of weights and ratios, each from what the others leave
@@ -118,16 +118,34 @@ class Discrepancy:
         spread, back = _decomposed(columns.T @ columns)
         return _Shrinking.of(self.basis @ (columns @ (back / spread)), spread)
 
-    def small_changes(self, errors: Array, low: Array, high: Array, method: Method = "trf") -> Array:
-        """Return the most likely small changes within bounds, in the catalogue's sizes, shape (changes,).
+    def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
+        """Return the parameters' most likely small changes within bounds, in the catalogue's sizes, (parameters,).
 
-        By a method of `scipy.optimize.lsq_linear`: both end within 1e-4 of a size, "bvls" five times as fast.
+        Those of instruments and ripples, which have no bounds, are solved for beside them: that leaves a quarter of the
+        unknowns.
         """
+        if not self.parameters:
+            return np.zeros(0)
         inside = (errors * self.scale * self.root_weight) @ self.basis
-        rows = np.vstack([self.spread[:, None] * self.back, np.eye(self.back.shape[1])])
-        asked = -np.r_[inside, np.zeros(self.back.shape[1])]
-        found: Array = self.small * lsq_linear(rows, asked, (low / self.small, high / self.small), method).x
+        pull = (self.spread * inside) @ self.back
+        root, beside = self._beside_unnamed
+        asked = solve_triangular(root, pull[: self.parameters] - beside @ pull[self.parameters :], trans="T")
+        sd = self.small[: self.parameters]
+        found: Array = sd * lsq_linear(root, -asked, (low / sd, high / sd), "bvls").x
         return found
+
+    @cached_property
+    def _beside_unnamed(self) -> tuple[Array, Array]:
+        """The parameters' information beside unnamed changes, as its Cholesky factor, and what these take of a pull.
+
+        Shapes (parameters, parameters) and (parameters, unnamed). By the Schur complement of the unnamed changes.
+        """
+        rows = self.spread[:, None] * self.back
+        information = rows.T @ rows + np.eye(len(self.small))
+        named, unnamed = slice(None, self.parameters), slice(self.parameters, None)
+        between = information[named, unnamed]
+        beside = np.linalg.solve(information[unnamed, unnamed], between.T).T
+        return cholesky(information[named, named] - beside @ between.T), np.asarray(beside, float)
 
 
 def discrepancy(
@@ -157,9 +175,10 @@ def discrepancy(
         How many of the changes, the first, are of parameters.
     """
     ratios, weight = np.ones(len(CHANNELS)), np.ones(len(errors))
+    wide, columns = slopes * large, np.empty_like(slopes)
     for _ in range(ROUNDS):
         scale = 1.0 / np.sqrt(ratios[channel])
-        columns = slopes * large * (scale * weight)[:, None]
+        np.multiply(wide, (scale * weight)[:, None], out=columns)
         gram = columns.T @ columns + np.eye(len(large))
         explained = columns @ np.linalg.solve(gram, (errors * scale * weight) @ columns)
         left = errors * scale - explained / weight

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.camera_mark import with_fitted_mark
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
-from gecar.reality.fitting.discrepancy import Discrepancy, Method, discrepancy
+from gecar.reality.fitting.discrepancy import Discrepancy, discrepancy
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.initial_values import ripple_responses
 from gecar.reality.fitting.model import Model
@@ -223,15 +223,8 @@ class Problem:
         if left is None:
             return model.physics
         parameters, z, at = self._with_others(model)
-        z[at] += self._linear_changes(left, errors, *self._room(parameters, z, at), method="bvls")
+        z[at] += left.small_changes(errors, *self._room(parameters, z, at))
         return parameters.physics(np.clip(z, *parameters.bounds))
-
-    def _linear_changes(
-        self, left: Discrepancy, errors: Array, low: Array, high: Array, method: Method = "trf"
-    ) -> Array:
-        """Return the most likely small changes by derivatives, within bounds, shape (changes,)."""
-        others = np.full(len(left.small) - len(low), 1.0)  # of instruments and ripples
-        return left.small_changes(errors, np.r_[low, -others], np.r_[high, others], method)[: len(low)]
 
     def small_changes(self, model: Model, beside: Model | None = None) -> dict[str, dict[str, float]]:
         """Return a model's values with the most likely small changes of all other parameters, by effect and label."""
@@ -273,7 +266,7 @@ class Problem:
             return out if changes.ndim == 2 else out[0]
 
         bounds = low[moving], high[moving]
-        linear = self._linear_changes(left, self.residuals.errors(model.physics), low, high)
+        linear = left.small_changes(self.residuals.errors(model.physics), low, high)
         starts = np.array([np.zeros(len(moving)), linear[moving]])
         start = starts[int(np.argmin(cost_of_each(residual, starts)))]
         probes = PROBE * np.minimum(high, 1.0)[moving]
