@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.concealing import EV3, motion_of, recorded
 
+from gecar.reality.fitting.initial_values import Wave
 from gecar.reality.selection.null_distribution import largest_gains
 from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.screening import candidate_steps
@@ -35,3 +36,24 @@ def test_what_a_search_over_places_cycles_and_limits_finds_in_noise_is_no_surpri
     # of eight that are even between 0 and 1 three are as small in 0.6 % of all cases
     assert np.sum(np.array(p) < 0.05) <= 2
     assert np.median(p) > 0.1
+
+
+def test_what_a_search_would_find_is_replayed_once_for_all_robots_that_are_near() -> None:
+    estimator = of_noise("torque_ripple", 0).estimator
+    one, near, far = (
+        estimator.fit(("rotor_inertia",), {"rotor_inertia": {"scale": scale}}, rounds=0)
+        for scale in (1.1, 1.12, 1.5)
+    )
+    waves = estimator.ripples(one)
+    assert one.is_near(near)
+    assert estimator.ripples(near) is waves
+    assert not one.is_near(far)
+    assert not one.is_near(estimator.known())
+    assert estimator.ripples(far) is not waves
+    anew = of_noise("torque_ripple", 0).estimator.ripples(near)
+    off, of = (np.linalg.norm([w.columns for w in each]) for each in (_less(anew, waves), anew))
+    assert 0.0 < off < 0.1 * of
+
+
+def _less(some: list[Wave], others: list[Wave]) -> list[Wave]:
+    return [a._replace(columns=a.columns - b.columns) for a, b in zip(some, others, strict=True)]

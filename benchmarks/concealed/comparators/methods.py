@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 from unittest.mock import patch
@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from gecar.reality import discovery
 from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
@@ -76,12 +75,7 @@ def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]
     estimator = problem.estimator
     parameters = free(estimator.robot, (*model.effects, effect))
     residual = estimator.residual(parameters)
-
-    def errors(tried: Sequence[Mapping[str, float]]) -> Array:
-        return residual(np.array([parameters.vector({**model.values, effect: values}) for values in tried]))
-
-    begun = initial_values(effect, estimator.robot, problem.recordings, errors)
-    places = [{**model.values, effect: v} for v in begun]
+    places = [{**model.values, effect: v} for v in estimator.starts(model, effect)]
     costs = [cost(residual(parameters.vector(values))) for values in places]
     gain = model.cost - min(costs, default=math.inf)
     return (

@@ -18,7 +18,6 @@ from gecar.reality.compare.side_by_side import (
     root_mean,
     side_by_side,
 )
-from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.optimisation.least_squares import cost_of_each
 from gecar.reality.residuals.of_case import Residuals
@@ -134,10 +133,9 @@ def _fitted(problem: Problem, base: Model, effects: list[str], count: int) -> di
     gains = {effect: estimator.linear_gain(base, effect) for effect in effects}
     found = {}
     for effect in sorted(effects, key=lambda e: -gains[e])[: max(count, 0)]:
-        trial = estimator.trial(base, effect)
-        starts = initial_values(effect, estimator.robot, problem.recordings, trial)
+        starts = estimator.starts(base, effect)
         if starts:
-            best = starts[int(np.argmin(cost_of_each(trial, starts)))]
+            best = starts[int(np.argmin(cost_of_each(estimator.trial(base, effect), starts)))]
             found[effect] = estimator.fit((*base.effects, effect), {**base.values, effect: best})
     return found
 

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.discrepancy import Discrepancy
+from gecar.reality.fitting.initial_values import (
+    Errors,
+    Single,
+    Values,
+    Wave,
+    initial_values,
+    responses,
+    ripples,
+)
 from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import (
+    TOGETHER,
     Minimum,
     Residual,
     cost,
@@ -23,11 +33,15 @@ from gecar.reality.optimisation.least_squares import (
     steps_inwards,
     weights,
 )
+from gecar.reality.recordings.recording import Recording
 from gecar.reality.residuals.of_case import Residuals
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
+RIPPLE = "torque_ripple"
 CACHED_FITS = 2  # whose sensitivities are kept: ten megabytes each
+CACHED_RESPONSES = 4  # models whose responses are kept: tens of megabytes each
 REFINED_SPREAD = 0.25  # of a parameter's search spread: about a fit that least squares has refined
 FAINT = 1e-9  # a sensitivity that is none
 LEAST_NORM = 1e-6  # weighted sensitivities smaller than this say nothing
@@ -72,6 +86,7 @@ class Estimator:
         self.blocks = Blocks(residuals.index)
         self.on_bench = all(r.recording.setup.rig == "bench" for r in residuals.recordings)
         self._cache: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
+        self._kept: list[tuple[Model, dict[str, list[Any]]]] = []
 
     def under(self, discrepancy: Discrepancy | None) -> Estimator:
         """Return this with another discrepancy; derivatives taken so far are kept."""
@@ -82,6 +97,11 @@ class Estimator:
     def cost_of(self, errors: Array) -> float:
         """Return the robust cost of residuals in units of the sensors' noise, shape (n,)."""
         return cost(self.whitened(errors))
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Of which robot's motion and readings the residuals are."""
+        return tuple(r.recording for r in self.residuals.recordings)
 
     def known(self) -> Model:
         """Return the robot as it is known, with nothing fitted."""
@@ -107,6 +127,46 @@ class Estimator:
             )
 
         return errors
+
+    def starts(self, model: Model, effect: str) -> list[Values]:
+        """Return values of one more effect to start fits from, by label."""
+        waves: list[Wave] = []
+        if effect == RIPPLE:
+            waves = [w._replace(columns=self.whitened(w.columns.T).T) for w in self.ripples(model)]
+        return initial_values(effect, self.robot, self.recordings, self.trial(model, effect), waves)
+
+    def responses(self, model: Model, effect: str) -> Iterator[Array]:
+        """Yield what residuals do in every direction that a search for one more effect looks in, shape (n, k).
+
+        As `gecar.reality.fitting.initial_values.responses`, and of a ripple its sines.
+        """
+
+        def made(errors: Errors) -> Iterable[Single]:
+            return responses(effect, self.robot, self.recordings, errors)
+
+        found = (
+            [w.columns for w in self.ripples(model)] if effect == RIPPLE else self._near(model, effect, made)
+        )
+        for first in range(0, len(found), TOGETHER):
+            some = found[first : first + TOGETHER]
+            yield from np.split(self.whitened(np.concatenate(some, axis=1).T).T, len(some), axis=1)
+
+    def ripples(self, model: Model) -> list[Wave]:
+        """Return what torque ripples add to a model's residuals, in units of the sensors' noise."""
+        return self._near(model, RIPPLE, lambda errors: ripples(self.robot, self.recordings, errors))
+
+    def _near(self, model: Model, effect: str, make: Callable[[Errors], Iterable[T]]) -> list[T]:
+        """Return what is made from an effect's residuals on top of a model, in units of the sensors' noise.
+
+        Once for all models near: what is small changes residuals alike beside them, and takes hundreds of replays.
+        """
+        kept = next((kept for other, kept in self._kept if model.is_near(other)), None)
+        if kept is None:
+            kept = {}
+            self._kept[:] = [*self._kept[1 - CACHED_RESPONSES :], (model, kept)]
+        if effect not in kept:
+            kept[effect] = list(make(self.under(None).trial(model, effect)))
+        return kept[effect]
 
     def fit(
         self,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,11 @@ from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
+Single = npt.NDArray[np.float32]
 Values = Mapping[str, float]
 Errors = Callable[[Sequence[Values]], Array]
 
+SHAFT_CYCLES = "shaft cycles"
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (0.5, 3.0, 12.0)  # in steps worth a name; where less is material, fits begin at less
@@ -48,8 +51,30 @@ PATCH_GRIPS = (0.06, 0.15, 0.3, 0.45, 0.65)
 SCANNED_GRIPS = (0.15, 0.3, 0.6)
 
 
+class Wave(NamedTuple):
+    """A torque ripple of so many cycles a turn, and what it does.
+
+    Attributes
+    ----------
+    cycles
+        Cycles a turn of a shaft.
+    amplitude_nm
+        Amplitude [N m].
+    columns
+        What a sine and a cosine of it on either shaft add to residuals, shape (n, 4).
+    """
+
+    cycles: int
+    amplitude_nm: float
+    columns: npt.NDArray[Any]
+
+
 def initial_values(
-    effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Errors
+    effect_id: str,
+    robot: Robot,
+    recordings: Sequence[Recording],
+    errors: Errors,
+    waves: Sequence[Wave] = (),
 ) -> list[Values]:
     """Return values of an effect's parameters to start from, by label.
 
@@ -63,10 +88,14 @@ def initial_values(
         Of that robot.
     errors
         Returns the residuals under the effect with several values, shape (values, n).
+    waves
+        What ripples add to those residuals (`ripples`), where that is known.
     """
     effect = BY_ID[effect_id]
     if effect.starts:
         return list(effect.starts)
+    if effect.scan == SHAFT_CYCLES:
+        return list(_shaft_cycles(errors, waves or ripples(robot, recordings, errors)))
     if effect.scan:
         return list(_SCANS[effect.scan](robot, recordings, errors))
     return list(_both_sides(effect_id, robot))
@@ -74,16 +103,14 @@ def initial_values(
 
 def responses(
     effect_id: str, robot: Robot, recordings: Sequence[Recording], errors: Errors
-) -> Iterator[Array]:
+) -> Iterator[Single]:
     """Yield what residuals do in every direction that a search from these starting values looks in, shape (n, k).
 
     A single column is an effect at certain values, less nothing: residuals fall by a multiple of it, 0 or more. Several
-    are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much.
+    are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much. So are ripples
+    (`ripples`).
     """
     effect = BY_ID[effect_id]
-    if effect.scan == "shaft cycles":
-        yield from (-basis for _, _, basis in _ripples(robot, recordings, errors, _unrippled(errors)))
-        return
     values: Sequence[Values] = ()
     if effect.at_a_place:
         larger = [r for r in PATCH_RADII_M if r > SCANNED_RADIUS_M]
@@ -93,7 +120,7 @@ def responses(
         values = initial_values(effect_id, robot, recordings, errors)
     if values:
         bare = errors([{}])[0]
-        yield from ((bare - each)[:, None] for each in residuals_of_each(errors, values))
+        yield from ((bare - each)[:, None].astype(np.float32) for each in residuals_of_each(errors, values))
 
 
 def _both_sides(effect_id: str, robot: Robot) -> Iterator[Values]:
@@ -139,16 +166,16 @@ def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
         yield {"duty_pct": float(edge), "offset_share": 0.0}
 
 
-def _shaft_cycles(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
-    """Scan cycles of which the shafts have turned two at least: less could be any force along the way.
+def _shaft_cycles(errors: Errors, waves: Iterable[Wave]) -> Iterator[Values]:
+    """Begin with the ripples that gain most.
 
-    Nothing ties the two motors' phases together, but sines add up: four replays tell what a sine and a cosine on
-    either shaft do, and least squares gives both phases at once, and which cycles are worth trying.
+    Nothing ties the two motors' phases together, but sines add up: least squares gives both phases at once, and which
+    cycles are worth trying.
     """
     bare = _unrippled(errors)
     w, least = np.sqrt(weights(bare)), cost(bare)
     fits = []
-    for cycles, size, basis in _ripples(robot, recordings, errors, bare):
+    for cycles, size, basis in waves:
         weighted = w[:, None] * basis
         a, b, c, d = sines = -np.linalg.lstsq(weighted, w * bare, rcond=None)[0]
         most = size * max(math.hypot(a, b), math.hypot(c, d))
@@ -173,26 +200,20 @@ def _unrippled(errors: Errors) -> Array:
     return errors([_rippled(1, 0.0, 0.0, 0.0)])[0]
 
 
-def ripple_responses(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Array]:
-    """Yield what ripples of a size worth a name and any phase add to residuals, shape (n, 4)."""
-    size = BY_ID["torque_ripple"].parameters[0].worthwhile * torque_scale(robot)
-    for _, amplitude, basis in _ripples(robot, recordings, errors, _unrippled(errors)):
-        yield basis * (size / amplitude)
+def ripples(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Wave]:
+    """Replay a ripple of every number of cycles of which the shafts have turned two at least.
 
-
-def _ripples(
-    robot: Robot, recordings: Sequence[Recording], errors: Errors, bare: Array
-) -> Iterator[tuple[int, float, Array]]:
-    """Yield cycles, an amplitude, and what a sine and a cosine of it on either shaft add to residuals, shape (n, 4)."""
+    Less could be any force along the way. Four replays tell what a sine and a cosine on either shaft do.
+    """
     turned = max(_turned(r, robot) for r in recordings)
-    size, quarter = 0.01 * torque_scale(robot), 0.5 * math.pi
+    size, quarter, bare = 0.01 * torque_scale(robot), 0.5 * math.pi, _unrippled(errors)
     pairs = ((0.0, 0.0), (math.pi, 0.0), (quarter, quarter), (-quarter, quarter))
     scanned = [cycles for cycles in CYCLES if cycles * turned >= LEAST_CYCLES]
     for two in (scanned[first : first + 2] for first in range(0, len(scanned), 2)):
         waves = errors([_rippled(cycles, *pair, size) for cycles in two for pair in pairs]) - bare
         for cycles, (sines, sine, cosines, cosine) in zip(two, np.split(waves, len(two)), strict=True):
-            basis = 0.5 * np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
-            yield cycles, size, basis
+            columns = np.stack([sines - sine, cosines - cosine, sines + sine, cosines + cosine], axis=1)
+            yield Wave(cycles, size, (0.5 * columns).astype(np.float32))
 
 
 def _rippled(cycles: int, left: float, right: float, amplitude: float) -> dict[str, float]:
@@ -296,7 +317,6 @@ Scan = Callable[[Robot, Sequence[Recording], Errors], Iterable[Values]]
 _SCANS: dict[str, Scan] = {
     "slow speeds": lambda robot, recordings, errors: _slow_speeds(robot, recordings),  # noqa: ARG005
     "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
-    "shaft cycles": _shaft_cycles,
     "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
     "shares of stall current": lambda robot, recordings, errors: _currents(robot),  # noqa: ARG005
     "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot, recordings),  # noqa: ARG005

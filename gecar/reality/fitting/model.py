@@ -14,6 +14,7 @@ from gecar.reality.optimisation.least_squares import Minimum
 
 Array = npt.NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
+NEAR = 1.0  # in sizes worth a name
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,14 @@ class Model:
     def key(self) -> tuple[tuple[str, ...], bytes]:
         """Its effects and coordinates, which tell it from other models of the same robot."""
         return self.effects, self.minimum.z.tobytes()
+
+    def is_near(self, other: Model) -> bool:
+        """Whether another model has the same effects, and each parameter within `NEAR` of this one's."""
+        mine, theirs = (
+            dict(zip(((c.effect.id, c.parameter.label) for c in m.parameters.coordinates), m.z, strict=True))
+            for m in (self, other)
+        )
+        return mine.keys() == theirs.keys() and all(abs(z - theirs[k]) < NEAR for k, z in mine.items())
 
     @property
     def errors(self) -> Array:

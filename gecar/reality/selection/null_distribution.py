@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.initial_values import responses
 from gecar.reality.fitting.model import Model
 from gecar.reality.optimisation.least_squares import weights
 
@@ -48,9 +47,8 @@ def _scores(
 ) -> Iterator[tuple[Array, bool]]:
     """Yield each span's scores in the directions fitted together, shape (spans, k), and whether they were searched."""
     weighted, of = np.sqrt(weights(model.errors)) * model.errors, estimator.blocks.spans
-    recordings = [r.recording for r in estimator.residuals.recordings]
-    found = responses(effect, estimator.robot, recordings, estimator.trial(model, effect))
-    for columns, searched in itertools.chain([(slopes, False)], ((each, True) for each in found)):
+    found = ((each, True) for each in estimator.responses(model, effect))
+    for columns, searched in itertools.chain([(slopes, False)], found):
         g = projected(columns)
         if g.shape[1]:
             q = np.linalg.qr(g)[0]

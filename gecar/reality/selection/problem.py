@@ -12,10 +12,9 @@ import numpy.typing as npt
 from gecar.reality.fitting.camera_mark import with_fitted_mark
 from gecar.reality.fitting.clock_offsets import with_fitted_clocks
 from gecar.reality.fitting.discrepancy import Discrepancy, discrepancy
-from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.initial_values import ripple_responses
+from gecar.reality.fitting.estimator import RIPPLE, Estimator
 from gecar.reality.fitting.model import Model
-from gecar.reality.fitting.parameters import Parameters, free
+from gecar.reality.fitting.parameters import Parameters, free, torque_scale
 from gecar.reality.materiality import DEFAULT, Material
 from gecar.reality.optimisation.least_squares import cost_of_each, least_squares
 from gecar.reality.recordings.recording import Recording
@@ -28,7 +27,7 @@ from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
-RIPPLE, SPOT_SIZE = "torque_ripple", "spot_size"
+SPOT_SIZE = "spot_size"
 LEAST_ROOM = 1e-6  # between bounds that would otherwise touch
 PROBE = 0.4  # of a size worth a name: step of finite differences by small changes
 REFINEMENTS = 2  # of small changes, by derivatives taken anew
@@ -100,7 +99,7 @@ class Problem:
     @property
     def recordings(self) -> tuple[Recording, ...]:
         """Of which robot's motion and readings they are."""
-        return tuple(r.recording for r in self.residuals.recordings)
+        return self.estimator.recordings
 
     @property
     def is_only_one(self) -> bool:
@@ -449,7 +448,8 @@ def small_sensitivities(
     if RIPPLE in out:
         del out[RIPPLE]
         if RIPPLE not in model.effects:
-            waves = ripple_responses(plain.robot, problem.recordings, plain.trial(model, RIPPLE))
+            size = BY_ID[RIPPLE].parameters[0].worthwhile * torque_scale(plain.robot)
+            waves = (wave.columns * (size / wave.amplitude_nm) for wave in plain.ripples(model))
             out[RIPPLE] = np.concatenate([np.zeros((len(model.errors), 0)), *waves], axis=1)
     return {**out, "": problem.residuals.instrument_errors(model.physics)}
 

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import Estimator
-from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.fitting.parameters import free as free_parameters
@@ -109,12 +108,11 @@ def _scored(problem: Problem, model: Model, effect: str) -> _Trial | None:
     """Score an effect without fitting it: by its sensitivities at the model, and by trying its starting values."""
     estimator = problem.estimator
     parameters = free_parameters(estimator.robot, (*model.effects, effect))
-    trial = estimator.trial(model, effect)
-    values = initial_values(effect, estimator.robot, problem.recordings, trial)
+    values = estimator.starts(model, effect)
     if not values:
         return None
     starts = [parameters.vector({**model.values, effect: each}) for each in values]
-    found = cost_of_each(trial, values)
+    found = cost_of_each(estimator.trial(model, effect), values)
     order = np.argsort(found)
     search = BY_ID[effect].search or USUAL
     kept = _apart([starts[k] for k in order], search.restarts, search.apart)

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import directions
-from gecar.reality.fitting.initial_values import initial_values, patches
+from gecar.reality.fitting.initial_values import patches
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.optimisation.least_squares import costs
@@ -130,8 +130,7 @@ class _Search:
         if BY_ID[effect].at_a_place:
             tried = patches(problem.recordings, MOST_PLACES)
         elif any(p.worthwhile == 0.0 for p in BY_ID[effect].parameters[1:]):
-            trial = problem.estimator.trial(model, effect)
-            tried = list(initial_values(effect, problem.estimator.robot, problem.recordings, trial))[:1]
+            tried = problem.estimator.starts(model, effect)[:1]
         return [self._parameters.vector({**model.values, effect: values}) for values in tried or ({},)]
 
     def _smallest(self, start: Array, side: float) -> float:
