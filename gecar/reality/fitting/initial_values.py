@@ -42,7 +42,7 @@ _TIMES = (
 PHASE_COUNTS = 0.9  # of a ripple's gain: what its opposite may gain, too, by slowing motors down
 CYCLES = (*range(1, 25), 30, 36, 42, 48)  # a fit moves them by hundredths only; fast ones are hardly seen
 BEST_CYCLES = 8
-PATCH_PITCH_M, MOST_CELLS, BEST_CELLS = 0.1, 300, 4
+PATCH_PITCH_M, MOST_CELLS, BEST_CELLS, BEST_SHAPES = 0.1, 300, 4, 4
 PATCH_RADII_M = (0.07, 0.1, 0.15, 0.2, 0.3)
 SCANNED_RADIUS_M = 0.1
 MOUNTS_M = (-0.02, -0.01, -0.003, 0.0, 0.003, 0.01, 0.02)  # from nominal: an edge is 8 mm wide
@@ -242,6 +242,8 @@ def _wheel_angles(recording: Recording) -> Array:
 def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Values]:
     """Scan the floor where the robot has been, on a grid a patch cannot slip through; then sizes and grips there.
 
+    The best of those are begun with between the places of the grid, too.
+
     A patch that grips too little costs more than none: a cell counts by the multiple of what a patch does there that
     lowers residuals most (a matched filter: Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4).
     """
@@ -253,9 +255,12 @@ def _floor_cells(recordings: Sequence[Recording], errors: Errors) -> Iterator[Va
     kept = (k for k in np.argsort(-gains, kind="stable") if gains[k] > LEAST_GAIN)
     best = list(dict.fromkeys((tried[k]["x_m"], tried[k]["y_m"]) for k in kept))
     half = 0.5 * PATCH_PITCH_M
-    for (x, y), radius, grip in itertools.product(best[:BEST_CELLS], PATCH_RADII_M, PATCH_GRIPS):
-        for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
-            yield _patch(x + dx, y + dy, radius, grip)
+    for x, y in best[:BEST_CELLS]:
+        shapes = [*itertools.product(PATCH_RADII_M, PATCH_GRIPS)]
+        found = cost_of_each(errors, [_patch(x, y, *shape) for shape in shapes])
+        for k in np.argsort(found, kind="stable")[:BEST_SHAPES]:
+            for dx, dy in ((0.0, 0.0), (half, 0.0), (-half, 0.0), (0.0, half), (0.0, -half)):
+                yield _patch(x + dx, y + dy, *shapes[k])
 
 
 def _gain_of_multiple(errors: Array, response: Array) -> float:
