@@ -513,6 +513,19 @@ def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
     assert told.size == written.explained.problem.sizes.apart(whole.physics, rest.physics)
 
 
+def test_an_only_law_that_is_an_effect_is_told_as_that_effect():
+    robot = EV3.with_effects({"battery_drain": {"rate_v_s": 0.08}})
+    explained, held = with_nothing_named(robot, "battery_drain")
+    written = invention.invent(explained, held, FEW)
+    assert written.terms == written.invented == ()
+    (step,) = written.explained.steps
+    assert step.effect == "battery_drain"
+    assert step.holdout_gain > 0.0
+    assert step.left_out.sum() > step.null_95
+    assert written.explained.taken.values["battery_drain"]["rate_v_s"] == pytest.approx(0.08, rel=0.05)
+    assert not explained.steps
+
+
 @pytest.mark.parametrize(("c1", "left"), [(-1e-7, []), (-3e-4, ["c1 * speed * abs(speed)"])])
 def test_a_law_that_an_effect_makes_idle_goes(c1, left):
     drag = Term(**{**dict(DRAG), "c1": c1})

@@ -23,6 +23,7 @@ from gecar.reality.invent.written import (
 from gecar.reality.prove.confirmation import confirmed
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.selection.acceptance import is_material, stands_out
+from gecar.reality.selection.cross_validation import judged
 from gecar.reality.selection.homogeneity import drifts
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.stepwise import Explanation, beside_others, proved_steps
@@ -34,6 +35,7 @@ from gecar.world.terms import Term
 Array = npt.NDArray[np.float64]
 
 AS_MUCH = 0.5  # of what a part of a law does: what an effect's derivative must do, to be tried in its place
+SAME = 0.98  # the same, of an effect that a law is
 
 
 def with_effects(written: Written, first: Explanation, held: Residuals) -> Written:
@@ -47,7 +49,7 @@ def with_effects(written: Written, first: Explanation, held: Residuals) -> Writt
         swapped = _with_one_more(without, first, held)
         if swapped and step.effect not in swapped.explained.taken.effects:
             written = swapped
-    written = _in_place_of_laws(written, first, held)
+    written = _in_place_of_laws(_as_effect(written, first), first, held)
     while len(written.explained.taken.effects) < MOST_EFFECTS:
         more = _with_one_more(written, first, held)
         if more is None:
@@ -77,6 +79,30 @@ def _refitted(written: Written, first: Explanation, fitted: Together) -> Written
     return written_with(written, replace(first, steps=written.explained.steps), fitted)
 
 
+def _as_effect(written: Written, first: Explanation) -> Written:
+    """Tell an only law that is an effect of the catalogue as that effect: a supply that falls with time is a drain.
+
+    It was proved and confirmed as a law. As an effect it was refused, for beside what no list holds whole drives may
+    come out worse with a cause.
+    """
+    here = written.explained
+    if len(written.terms) != 1 or len(pieces(written.terms[0])) != 1:
+        return written
+    fitted = fitted_with(written, first, ())
+    same = _doing(here, fitted.errors - here.taken.errors, SAME)
+    if not same:
+        return written
+    without = replace(_refitted(written, first, fitted), invented=())
+    others = frozenset(here.problem.catalogue) - same
+    stage = candidate_steps(replace(without.explained.problem, refused=others), without.explained.taken)
+    if not stage:
+        return written
+    step = replace(judged(without.explained.problem, stage[0]), holdout_gain=written.invented[0].holdout_gain)
+    told = _with_step(without, first, step, (*here.tried, tuple(stage)))
+    as_good = here.problem.cost_of(told.explained.taken.physics) <= here.taken.cost + PRICE
+    return told if as_good and _hold(told.explained) else written
+
+
 def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> Written:
     """Exchange a law beside others, or a part of its sum, for an effect that explains about as much, until none does.
 
@@ -90,7 +116,7 @@ def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> 
         fitted = fitted_with(written, first, fewer)
         # A whole law may do far more than derivatives tell: any effect is then tried.
         is_part = len(fewer) == len(written.terms)
-        alike = _doing_as_much(here, fitted.errors - here.taken.errors) if is_part else catalogue
+        alike = _doing(here, fitted.errors - here.taken.errors, AS_MUCH) if is_part else catalogue
         if not alike:
             continue
         others = catalogue - alike
@@ -111,14 +137,14 @@ def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
             yield _without_law(written, k)
 
 
-def _doing_as_much(here: Explanation, change: Array) -> set[str]:
-    """Return the effects whose derivatives explain most of a change of the residuals, shape (n,)."""
+def _doing(here: Explanation, change: Array, share: float) -> set[str]:
+    """Return the effects whose derivatives explain such a share of a change of the residuals, shape (n,)."""
     tried = [effect for effect in here.problem.catalogue if effect not in here.taken.effects]
     slopes = here.problem.estimator.sensitivities(here.taken, tried)
     return {
         effect
         for effect, columns in zip(tried, slopes, strict=True)
-        if np.sum((change @ directions(columns)) ** 2) >= AS_MUCH * (change @ change)
+        if np.sum((change @ directions(columns)) ** 2) >= share * (change @ change)
     }
 
 
@@ -131,29 +157,46 @@ def _with_one_more(
     stage = tuple(candidate_steps(problem, here.taken))
     tried = (*here.tried, stage)
     for step in proved_steps(problem, stage):
-        effects, steps = step.model.effects, (*here.steps, replace(step, stage=len(tried) - 1))
-        start = free(first.problem.estimator.robot, effects).vector(step.model.values)
-        fitted = together(first, problem.under(step.model), written.terms, effects, start)
-        more = written_with(written, replace(first, steps=steps, tried=tried), fitted)
+        more = _with_step(written, first, step, tried)
         explained = held_up(more.explained, held)
         if explained:
             return replace(more, explained=explained)
     return None
 
 
-def held_up(explained: Explanation, held: Residuals) -> Explanation | None:
-    """Return an explanation with its hold-out gains if all of its effects hold beside laws; else None.
+def _with_step(
+    written: Written, first: Explanation, step: Step, tried: Sequence[tuple[Step, ...]]
+) -> Written:
+    """Add an effect of the last stage tried, and fit all laws and effects again."""
+    here, effects = written.explained, step.model.effects
+    steps = (*here.steps, replace(step, stage=len(tried) - 1))
+    start = free(first.problem.estimator.robot, effects).vector(step.model.values)
+    fitted = together(first, here.problem.under(step.model), written.terms, effects, start)
+    return written_with(written, replace(first, steps=steps, tried=tuple(tried)), fitted)
 
-    Each must be material, of one size, and asked for by the recordings set aside. Where much is left they must stand
-    out of it, as effects without laws must.
+
+def _hold(explained: Explanation) -> bool:
+    """Whether all effects hold beside laws: each is material and of one size, and stands out of what is left, if much.
+
+    As effects without laws must.
     """
     problem, model = explained.problem, explained.taken
     for step in explained.steps:
         alone = beside_others(problem, model, step)
         if not is_material(problem, model, alone) or drifts(problem, model, alone):
-            return None
+            return False
         if explained.unexplained and not stands_out(problem, alone):
-            return None
+            return False
+    return True
+
+
+def held_up(explained: Explanation, held: Residuals) -> Explanation | None:
+    """Return an explanation with its hold-out gains if all of its effects hold beside laws; else None.
+
+    The recordings set aside must ask for each, too.
+    """
+    if not _hold(explained):
+        return None
     steps = confirmed(explained, held).explained.steps
     return replace(explained, steps=steps) if len(steps) == len(explained.steps) else None
 
