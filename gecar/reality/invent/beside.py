@@ -80,13 +80,14 @@ def _refitted(written: Written, first: Explanation, fitted: Together) -> Written
 
 
 def _as_effect(written: Written, first: Explanation) -> Written:
-    """Tell an only law that is an effect of the catalogue as that effect: a supply that falls with time is a drain.
+    """Replace a single law that is an effect of the catalogue by that effect: a supply that falls with time is a drain.
 
     It was proved and confirmed as a law. As an effect it was refused, for beside what no list holds whole drives may
     come out worse with a cause.
     """
     here = written.explained
-    if len(written.terms) != 1 or len(pieces(written.terms[0])) != 1:
+    is_single = len(written.terms) == 1 and len(pieces(written.terms[0])) == 1
+    if not is_single or len(here.taken.effects) >= MOST_EFFECTS:
         return written
     fitted = fitted_with(written, first, ())
     same = _doing(here, fitted.errors - here.taken.errors, SAME)
@@ -99,8 +100,7 @@ def _as_effect(written: Written, first: Explanation) -> Written:
         return written
     step = replace(judged(without.explained.problem, stage[0]), holdout_gain=written.invented[0].holdout_gain)
     told = _with_step(without, first, step, (*here.tried, tuple(stage)))
-    as_good = here.problem.cost_of(told.explained.taken.physics) <= here.taken.cost + PRICE
-    return told if as_good and _hold(told.explained) else written
+    return told if _explains_as_much(told, here) and _hold(told.explained) else written
 
 
 def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> Written:
@@ -122,9 +122,14 @@ def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> 
         others = catalogue - alike
         without = replace(_refitted(written, first, fitted), invented=told)
         swapped = _with_one_more(without, first, held, others)
-        if swapped and here.problem.cost_of(swapped.explained.taken.physics) <= here.taken.cost + PRICE:
+        if swapped and _explains_as_much(swapped, here):
             return _in_place_of_laws(swapped, first, held)
     return written
+
+
+def _explains_as_much(swapped: Written, here: Explanation) -> bool:
+    """Whether laws and effects cost no more than what they are to replace does, but for the price of a name."""
+    return here.problem.cost_of(swapped.explained.taken.physics) <= here.taken.cost + PRICE
 
 
 def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
@@ -138,7 +143,7 @@ def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
 
 
 def _doing(here: Explanation, change: Array, share: float) -> set[str]:
-    """Return the effects whose derivatives explain such a share of a change of the residuals, shape (n,)."""
+    """Return the effects whose derivatives explain at least a share of a change of the residuals, shape (n,)."""
     tried = [effect for effect in here.problem.catalogue if effect not in here.taken.effects]
     slopes = here.problem.estimator.sensitivities(here.taken, tried)
     return {
@@ -165,21 +170,18 @@ def _with_one_more(
 
 
 def _with_step(
-    written: Written, first: Explanation, step: Step, tried: Sequence[tuple[Step, ...]]
+    written: Written, first: Explanation, step: Step, tried: tuple[tuple[Step, ...], ...]
 ) -> Written:
     """Add an effect of the last stage tried, and fit all laws and effects again."""
     here, effects = written.explained, step.model.effects
     steps = (*here.steps, replace(step, stage=len(tried) - 1))
     start = free(first.problem.estimator.robot, effects).vector(step.model.values)
     fitted = together(first, here.problem.under(step.model), written.terms, effects, start)
-    return written_with(written, replace(first, steps=steps, tried=tuple(tried)), fitted)
+    return written_with(written, replace(first, steps=steps, tried=tried), fitted)
 
 
 def _hold(explained: Explanation) -> bool:
-    """Whether all effects hold beside laws: each is material and of one size, and stands out of what is left, if much.
-
-    As effects without laws must.
-    """
+    """Whether every effect is material, of one size and, where much is left, stands out of it: as without laws."""
     problem, model = explained.problem, explained.taken
     for step in explained.steps:
         alone = beside_others(problem, model, step)
