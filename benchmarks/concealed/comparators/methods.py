@@ -15,9 +15,8 @@ import numpy.typing as npt
 from gecar.reality import discovery
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.model import Effects, Model, Step
-from gecar.reality.fitting.parameters import free
 from gecar.reality.noise.excess_energy import Blocks
-from gecar.reality.optimisation.least_squares import cost
+from gecar.reality.optimisation.least_squares import cost_of_each
 from gecar.reality.prove import confirmation
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.replay.replayer import Replayer, replayer_of
@@ -73,14 +72,12 @@ def _stage(problem: Problem, model: Model) -> list[Step]:
 def _begun(problem: Problem, model: Model, effect: str) -> tuple[float, Effects]:
     """Return what one more effect promises to gain, and the best of its starts."""
     estimator = problem.estimator
-    parameters = free(estimator.robot, (*model.effects, effect))
-    residual = estimator.residual(parameters)
-    places = [{**model.values, effect: v} for v in estimator.starts(model, effect)]
-    costs = [cost(residual(parameters.vector(values))) for values in places]
+    starts = estimator.starts(model, effect)
+    costs = cost_of_each(estimator.trial(model, effect), starts)
     gain = model.cost - min(costs, default=math.inf)
     return (
         max(gain, estimator.linear_gain(model, effect)),
-        places[int(np.argmin(costs))] if places else {},
+        {**model.values, effect: starts[int(np.argmin(costs))]} if starts else {},
     )
 
 

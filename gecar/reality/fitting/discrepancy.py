@@ -119,10 +119,10 @@ class Discrepancy:
         return _Shrinking.of(self.basis @ (columns @ (back / spread)), spread)
 
     def small_changes(self, errors: Array, low: Array, high: Array) -> Array:
-        """Return the parameters' most likely small changes within bounds, in the catalogue's sizes, (parameters,).
+        """Return the parameters' most likely small changes within bounds, in the catalogue's sizes.
 
-        Those of instruments and ripples, which have no bounds, are solved for beside them: that leaves a quarter of the
-        unknowns.
+        Shape (parameters,). Those of instruments and ripples, which have no bounds, are eliminated: that leaves a
+        quarter of the unknowns.
         """
         if not self.parameters:
             return np.zeros(0)
@@ -136,9 +136,9 @@ class Discrepancy:
 
     @cached_property
     def _beside_unnamed(self) -> tuple[Array, Array]:
-        """The parameters' information beside unnamed changes, as its Cholesky factor, and what these take of a pull.
+        """The parameters' information with all others eliminated, as a Cholesky factor, and what eliminates these.
 
-        Shapes (parameters, parameters) and (parameters, unnamed). By the Schur complement of the unnamed changes.
+        Shapes (parameters, parameters) and (parameters, others). By the Schur complement of the others.
         """
         rows = self.spread[:, None] * self.back
         information = rows.T @ rows + np.eye(len(self.small))

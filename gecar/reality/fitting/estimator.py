@@ -86,7 +86,7 @@ class Estimator:
         self.blocks = Blocks(residuals.index)
         self.on_bench = all(r.recording.setup.rig == "bench" for r in residuals.recordings)
         self._cache: dict[tuple[tuple[str, ...], bytes], dict[str, Array]] = {}
-        self._kept: list[tuple[Model, dict[str, list[Any]]]] = []
+        self._responses: list[tuple[Model, dict[str, list[Any]]]] = []
 
     def under(self, discrepancy: Discrepancy | None) -> Estimator:
         """Return this with another discrepancy; derivatives taken so far are kept."""
@@ -100,7 +100,7 @@ class Estimator:
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
-        """Of which robot's motion and readings the residuals are."""
+        """The recordings that the residuals were computed from."""
         return tuple(r.recording for r in self.residuals.recordings)
 
     def known(self) -> Model:
@@ -132,41 +132,43 @@ class Estimator:
         """Return values of one more effect to start fits from, by label."""
         waves: list[Wave] = []
         if effect == RIPPLE:
-            waves = [w._replace(columns=self.whitened(w.columns.T).T) for w in self.ripples(model)]
+            whitened = zip(self.ripples(model), self.responses(model, effect), strict=True)
+            waves = [wave._replace(columns=columns) for wave, columns in whitened]
         return initial_values(effect, self.robot, self.recordings, self.trial(model, effect), waves)
 
     def responses(self, model: Model, effect: str) -> Iterator[Array]:
-        """Yield what residuals do in every direction that a search for one more effect looks in, shape (n, k).
+        """Yield how residuals change in each direction that a search for one more effect looks in, shape (n, k).
 
-        As `gecar.reality.fitting.initial_values.responses`, and of a ripple its sines.
+        As `gecar.reality.fitting.initial_values.responses`, and of a ripple its sines and cosines.
         """
 
-        def made(errors: Errors) -> Iterable[Single]:
+        def replayed(errors: Errors) -> Iterable[Single]:
             return responses(effect, self.robot, self.recordings, errors)
 
-        found = (
-            [w.columns for w in self.ripples(model)] if effect == RIPPLE else self._near(model, effect, made)
-        )
+        if effect == RIPPLE:
+            found = [wave.columns for wave in self.ripples(model)]
+        else:
+            found = self._once_near(model, effect, replayed)
         for first in range(0, len(found), TOGETHER):
             some = found[first : first + TOGETHER]
             yield from np.split(self.whitened(np.concatenate(some, axis=1).T).T, len(some), axis=1)
 
     def ripples(self, model: Model) -> list[Wave]:
         """Return what torque ripples add to a model's residuals, in units of the sensors' noise."""
-        return self._near(model, RIPPLE, lambda errors: ripples(self.robot, self.recordings, errors))
+        return self._once_near(model, RIPPLE, lambda errors: ripples(self.robot, self.recordings, errors))
 
-    def _near(self, model: Model, effect: str, make: Callable[[Errors], Iterable[T]]) -> list[T]:
-        """Return what is made from an effect's residuals on top of a model, in units of the sensors' noise.
+    def _once_near(self, model: Model, effect: str, replay: Callable[[Errors], Iterable[T]]) -> list[T]:
+        """Return what replays of one more effect give, in units of the sensors' noise: once for all models near.
 
-        Once for all models near: what is small changes residuals alike beside them, and takes hundreds of replays.
+        Something small changes the residuals of such models alike, and to know it takes hundreds of replays.
         """
-        kept = next((kept for other, kept in self._kept if model.is_near(other)), None)
-        if kept is None:
-            kept = {}
-            self._kept[:] = [*self._kept[1 - CACHED_RESPONSES :], (model, kept)]
-        if effect not in kept:
-            kept[effect] = list(make(self.under(None).trial(model, effect)))
-        return kept[effect]
+        known = next((known for other, known in self._responses if model.is_near(other)), None)
+        if known is None:
+            known = {}
+            self._responses[:] = [*self._responses[1 - CACHED_RESPONSES :], (model, known)]
+        if effect not in known:
+            known[effect] = list(replay(self.under(None).trial(model, effect)))
+        return known[effect]
 
     def fit(
         self,

@@ -52,7 +52,7 @@ SCANNED_GRIPS = (0.15, 0.3, 0.6)
 
 
 class Wave(NamedTuple):
-    """A torque ripple of so many cycles a turn, and what it does.
+    """A torque ripple, and how residuals respond to it.
 
     Attributes
     ----------
@@ -107,8 +107,8 @@ def responses(
     """Yield what residuals do in every direction that a search from these starting values looks in, shape (n, k).
 
     A single column is an effect at certain values, less nothing: residuals fall by a multiple of it, 0 or more. Several
-    are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much. So are ripples
-    (`ripples`).
+    are fitted together. Sizes on both sides of neutral are left out: derivatives there tell as much. Those of a ripple
+    are its waves (`ripples`).
     """
     effect = BY_ID[effect_id]
     values: Sequence[Values] = ()
@@ -167,7 +167,7 @@ def _duty_levels(recordings: Sequence[Recording]) -> Iterator[Values]:
 
 
 def _shaft_cycles(errors: Errors, waves: Iterable[Wave]) -> Iterator[Values]:
-    """Begin with the ripples that gain most.
+    """Yield the ripples that lower the cost most, to start from.
 
     Nothing ties the two motors' phases together, but sines add up: least squares gives both phases at once, and which
     cycles are worth trying.
@@ -201,9 +201,9 @@ def _unrippled(errors: Errors) -> Array:
 
 
 def ripples(robot: Robot, recordings: Sequence[Recording], errors: Errors) -> Iterator[Wave]:
-    """Replay a ripple of every number of cycles of which the shafts have turned two at least.
+    """Replay torque ripples of every number of cycles a turn that the shafts turned through two cycles of.
 
-    Less could be any force along the way. Four replays tell what a sine and a cosine on either shaft do.
+    Fewer could be any force along the way. Four replays tell what a sine and a cosine on either shaft do.
     """
     turned = max(_turned(r, robot) for r in recordings)
     size, quarter, bare = 0.01 * torque_scale(robot), 0.5 * math.pi, _unrippled(errors)

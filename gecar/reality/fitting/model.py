@@ -59,7 +59,7 @@ class Model:
         return self.effects, self.minimum.z.tobytes()
 
     def is_near(self, other: Model) -> bool:
-        """Whether another model has the same effects, and each parameter within `NEAR` of this one's."""
+        """Whether another model has the same effects, with every parameter within `NEAR` of this one's."""
         mine, theirs = (
             dict(zip(((c.effect.id, c.parameter.label) for c in m.parameters.coordinates), m.z, strict=True))
             for m in (self, other)

@@ -98,7 +98,7 @@ class Problem:
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
-        """Of which robot's motion and readings they are."""
+        """The recordings that its residuals were computed from."""
         return self.estimator.recordings
 
     @property
