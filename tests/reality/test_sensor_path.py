@@ -100,8 +100,7 @@ def test_a_lag_is_the_same_however_rarely_the_log_was_written() -> None:
 
     def read(t: np.ndarray) -> np.ndarray:
         out = np.empty(len(t))
-        floor = course.raster(course.pitch_m)
-        readings_along(t, across(t), 0.0, 0.5, floor, course.pitch_m, physics, np.zeros(3), out)
+        readings_along(t, across(t), 0.0, 0.5, course.surface, physics, np.zeros(3), out)
         return out
 
     assert np.ptp(read(often)) > 50.0

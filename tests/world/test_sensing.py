@@ -8,11 +8,13 @@ from gecar.world.kernel.sensing import (
     RING,
     delayed,
     glance,
+    is_even,
     lag_keep,
     lagged,
     reported,
     spot_average,
     spot_reflection,
+    surface,
 )
 from gecar.world.kernel.state import STATE, place
 from gecar.world.robot import load_robot
@@ -20,6 +22,7 @@ from gecar.world.rollout import World
 
 EV3, PAPER = load_robot("ev3"), load_course("paper")
 RASTER, PITCH = PAPER.raster(), PAPER.pitch_m
+SURFACE = surface(RASTER, PITCH)
 AVERAGED = spot_average(RASTER, PITCH, EV3.colour_sensor.spot_diameter)
 
 
@@ -57,14 +60,43 @@ def test_both_ways_to_average_agree():
     physics = EV3.physics[0]
     for _ in range(200):
         x, heading = rng.uniform(0.05, 0.12), rng.uniform(-0.3, 0.3)
-        slow = spot_reflection(RASTER, PITCH, x, 0.6, np.cos(heading), np.sin(heading), 0.0, 0.0, physics)
+        slow = spot_reflection(SURFACE, x, 0.6, np.cos(heading), np.sin(heading), 0.0, 0.0, physics)
         assert seen(x, 0.6, heading) == pytest.approx(slow, abs=1.5)
+
+
+def test_on_even_floor_one_cell_says_what_the_whole_spot_does():
+    rng = np.random.default_rng(1)
+    looked = SURFACE._replace(even=np.zeros_like(SURFACE.even))
+    skipped = 0
+    for _ in range(3000):
+        x, y = rng.uniform(-0.05, PAPER.width_m + 0.05), rng.uniform(-0.05, PAPER.height_m + 0.05)
+        robot = EV3.with_effects({"spot_size": {"diameter_m": rng.uniform(0.002, 0.03)}})
+        p, turn = robot.physics[0], rng.uniform(-np.pi, np.pi)
+        one, whole = (
+            spot_reflection(floor, x, y, np.cos(turn), np.sin(turn), 0.0, 0.0, p)
+            for floor in (SURFACE, looked)
+        )
+        assert one == pytest.approx(whole, abs=1e-9)
+        ahead = p["sensor_ahead"] * np.array([np.cos(turn), np.sin(turn)])
+        skipped += is_even(SURFACE, x + ahead[0], y + ahead[1], 0.5 * p["spot_diameter"])
+    assert 1000 < skipped < 2900
+
+
+def test_floor_is_even_as_far_as_its_cells_are_alike():
+    cells = np.full((40, 60), 255, np.uint8)
+    cells[20, 30] = 0
+    floor = surface(cells, 0.001)
+    assert is_even(floor, 0.0055, 0.0055, 0.004)
+    assert not is_even(floor, 0.0305, 0.0235, 0.004)
+    assert not is_even(floor, -0.001, 0.0055, 0.0)  # beside the field all is bare, and looked at
+    assert is_even(surface(np.zeros((40, 60), np.uint8), 0.001), 0.03, 0.02, 0.004)
+    assert not is_even(surface(np.zeros((40, 60), np.uint8), 0.001), 0.002, 0.002, 0.004)
 
 
 def spot_seen(x, y, heading=0.0, robot=EV3):
     """What `seen` gives, as fits see it: the spot averaged on the way."""
     cos, sin = np.cos(heading), np.sin(heading)
-    return spot_reflection(RASTER, PITCH, x, y, cos, sin, 0.0, 0.0, robot.physics[0])
+    return spot_reflection(SURFACE, x, y, cos, sin, 0.0, 0.0, robot.physics[0])
 
 
 @pytest.mark.parametrize("look", [seen, spot_seen])
@@ -113,7 +145,7 @@ def crossing(robot, seconds=0.6, dt=0.002):
     t = np.arange(0.0, seconds, dt)
     path = np.column_stack([0.02 + 0.25 * t, np.full_like(t, 0.6), np.zeros_like(t)])
     readings = np.zeros_like(t)
-    readings_along(t, path, 0.0, 1e-3, RASTER, PITCH, robot.physics, np.zeros(3), readings)
+    readings_along(t, path, 0.0, 1e-3, SURFACE, robot.physics, np.zeros(3), readings)
     return readings
 
 

@@ -207,8 +207,7 @@ def difference(commands: Commands, robot: Robot, rival: Robot, like: RecordingRe
 
 def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
     readings = np.empty(len(t))
-    floor, pitch = course.raster(course.pitch_m), course.pitch_m
-    readings_along(t, path, 0.0, sd, floor, pitch, robot.physics, np.zeros(3), readings)
+    readings_along(t, path, 0.0, sd, course.surface, robot.physics, np.zeros(3), readings)
     return readings
 
 

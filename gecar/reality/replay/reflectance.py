@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import compiled
-from gecar.world.kernel.sensing import spot_reflection
+from gecar.world.kernel.sensing import Surface, spot_reflection
 from gecar.world.kernel.terms import colour_error, sensor_shift
 
 Array = npt.NDArray[np.float64]
@@ -55,8 +55,7 @@ def _seen(
     t: Array,
     path: Array,
     late: float,
-    raster: npt.NDArray[np.uint8],
-    pitch: float,
+    floor: Surface,
     p: Any,
     shift: Array,
     k: int,
@@ -78,7 +77,7 @@ def _seen(
         front, left = sensor_shift(
             time, x, y, heading, vx * cos + vy * sin, vy * cos - vx * sin, turn_rate, p
         )
-    return k, spot_reflection(raster, pitch, x, y, cos, sin, front, left, p)
+    return k, spot_reflection(floor, x, y, cos, sin, front, left, p)
 
 
 @compiled
@@ -87,8 +86,7 @@ def readings_along(
     path: Array,
     late: float,
     noise: float,
-    raster: npt.NDArray[np.uint8],
-    pitch: float,
+    floor: Surface,
     physics: npt.NDArray[Any],
     shift: Array,
     readings: Array,
@@ -103,8 +101,8 @@ def readings_along(
         How much later than the sensor's clock the path's is [s].
     noise
         Standard deviation of a reading [%].
-    raster, pitch
-        The floor, as in `gecar.world.kernel.sensing.spot_reflection`.
+    floor
+        From `gecar.world.kernel.sensing.surface`.
     physics
         Record of dtype `PHYSICS`, shape (1,).
     shift
@@ -117,7 +115,7 @@ def readings_along(
     before = now = 0.0
     for i in range(t.shape[0]):
         if i == 0 or p.sensor_lag <= 0.0:
-            k, now = _seen(t[i], t, path, late, raster, pitch, p, shift, k, pose)
+            k, now = _seen(t[i], t, path, late, floor, p, shift, k, pose)
             before = now
         else:
             elapsed = t[i] - t[i - 1]
@@ -126,7 +124,7 @@ def readings_along(
             keep = math.exp(-piece / p.sensor_lag)
             for j in range(pieces):
                 at = t[i] - (pieces - 1 - j) * piece
-                k, seen = _seen(at, t, path, late, raster, pitch, p, shift, k, pose)
+                k, seen = _seen(at, t, path, late, floor, p, shift, k, pose)
                 # From piece to piece what is seen runs straight: a first-order lag's exact answer to a ramp.
                 slope = (seen - before) / piece
                 now = seen - slope * p.sensor_lag + (now - before + slope * p.sensor_lag) * keep

@@ -224,10 +224,9 @@ class RecordingResiduals:
         self, path: Array, physics: Physics, shift: Array = NO_SHIFT, late: float = 0.0, every: int = 1
     ) -> Array:
         assert self.course is not None
-        t, pitch = self.replayer.t[::every], self.course.pitch_m
+        t = self.replayer.t[::every]
         readings = np.empty(len(t))
-        floor, sd = self.course.raster(pitch), self.noise.reflection_sd
-        readings_along(t, path, late, sd, floor, pitch, physics, shift, readings)
+        readings_along(t, path, late, self.noise.reflection_sd, self.course.surface, physics, shift, readings)
         return readings
 
 

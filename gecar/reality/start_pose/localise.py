@@ -169,7 +169,7 @@ class _ReadingMisfit:
     def __init__(self, t: Array, readings: Array, course: Course, physics: Physics) -> None:
         self._t, self._physics = t, physics
         self._readings, self._there = readings, ~np.isnan(readings)
-        self._raster, self._pitch = course.raster(course.pitch_m), course.pitch_m
+        self._floor = course.surface
 
     def readings(self, fit: _Fit, spot_m: float = 0.0) -> Array:
         physics = self._physics.copy()
@@ -179,7 +179,7 @@ class _ReadingMisfit:
         physics["sensor_ahead"] += ahead
         physics["sensor_left"] += left
         out = np.empty(len(self._t))
-        readings_along(self._t, fit.path, -delay, 1.0, self._raster, self._pitch, physics, np.zeros(3), out)
+        readings_along(self._t, fit.path, -delay, 1.0, self._floor, physics, np.zeros(3), out)
         return out
 
     def errors(self, fit: _Fit, spot_m: float = 0.0) -> Array:

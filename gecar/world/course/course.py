@@ -25,7 +25,7 @@ from gecar.world.course.obstacle import Obstacle
 from gecar.world.course.random_course import random_text
 from gecar.world.course.raster import PITCH_M, WHITE, FloorImage
 from gecar.world.course.schema import validate
-from gecar.world.kernel.sensing import spot_average
+from gecar.world.kernel.sensing import Surface, spot_average, surface
 from gecar.world.robot import Robot
 
 __all__ = [
@@ -187,6 +187,11 @@ class Course(Displayed):
         if pitch_m not in self._rasters:
             self._rasters[pitch_m] = self._draw(pitch_m)
         return self._rasters[pitch_m]
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The floor as fits look at it."""
+        return surface(self.raster(self.pitch_m), self.pitch_m)
 
     def averaged(self, spot_m: float) -> npt.NDArray[np.float32]:
         """Return the floor's brightness averaged over a sensor's spot [m]; see `spot_average`. Kept, as `raster`."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import scipy.fft
+import scipy.ndimage
 
 from gecar.compiled import kernel
 
@@ -30,6 +31,39 @@ def _disc_points() -> npt.NDArray[np.float64]:
 
 
 _DISC = _disc_points()
+BLOCK = 4  # cells across a block
+
+
+class Surface(NamedTuple):
+    """A floor as fits look at it, where the spot differs from call to call; make it with `surface`.
+
+    Attributes
+    ----------
+    cells
+        Brightness, 255 bare floor and 0 line, shape (rows, columns), row 0 at the bottom. Around it the floor is bare.
+    pitch
+        Edge of a cell [m].
+    even
+        How many cells around each block of `BLOCK` x `BLOCK` have its brightness, shape (rows, columns) of blocks.
+    """
+
+    cells: npt.NDArray[np.uint8]
+    pitch: float
+    even: npt.NDArray[np.int32]
+
+
+def surface(cells: npt.NDArray[np.uint8], pitch: float) -> Surface:
+    """Return a floor of cells, 255 bare and 0 line, shape (rows, columns), each of this size [m], as fits look at it.
+
+    Most of a drive the spot lies on even floor: there one cell says as much as its average.
+    """
+    beyond = [(0, -size % BLOCK) for size in cells.shape]
+    filled = np.pad(cells, beyond, constant_values=255)
+    blocks = filled.reshape(filled.shape[0] // BLOCK, BLOCK, filled.shape[1] // BLOCK, BLOCK)
+    darkest = scipy.ndimage.minimum_filter(blocks.min((1, 3)), 3, mode="constant", cval=255)
+    brightest = scipy.ndimage.maximum_filter(blocks.max((1, 3)), 3, mode="constant", cval=255)
+    even = scipy.ndimage.distance_transform_cdt(darkest == brightest, "chessboard")
+    return Surface(cells, pitch, (BLOCK * even).astype(np.int32))
 
 
 def spot_average(raster: npt.NDArray[np.uint8], pitch: float, diameter: float) -> npt.NDArray[np.float32]:
@@ -120,8 +154,7 @@ def floor_brightness(raster: npt.NDArray[Any], pitch: float, x: float, y: float)
 
 @kernel
 def spot_reflection(
-    raster: npt.NDArray[np.uint8],
-    pitch: float,
+    floor: Surface,
     x: float,
     y: float,
     cos: float,
@@ -136,8 +169,8 @@ def spot_reflection(
 
     Parameters
     ----------
-    raster, pitch
-        Floor, shape (rows, columns), 255 bare and 0 line, row 0 at the bottom; size of a cell [m].
+    floor
+        From `surface`.
     x, y, cos, sin
         The axle's centre [m] and the heading.
     front, left
@@ -147,19 +180,33 @@ def spot_reflection(
     """
     ahead = p.sensor_ahead + front
     aside = p.sensor_left + left
-    radius = 0.5 * spot_reach(pitch, p.spot_diameter)
+    radius = 0.5 * spot_reach(floor.pitch, p.spot_diameter)
     # The course may lie displaced: look where the floor under the spot is drawn.
     turn_cos = math.cos(p.line_angle)
     turn_sin = math.sin(p.line_angle)
-    total = 0.0
-    for k in range(_DISC.shape[0]):
-        u = ahead + radius * _DISC[k, 0]
-        w = aside + radius * _DISC[k, 1]
-        px = x + u * cos - w * sin - p.line_dx
-        py = y + u * sin + w * cos - p.line_dy
-        total += floor_brightness(raster, pitch, px * turn_cos + py * turn_sin, py * turn_cos - px * turn_sin)
-    share = total / (255.0 * _DISC.shape[0])
+    px = x + ahead * cos - aside * sin - p.line_dx
+    py = y + ahead * sin + aside * cos - p.line_dy
+    px, py = px * turn_cos + py * turn_sin, py * turn_cos - px * turn_sin
+    if is_even(floor, px, py, radius):
+        share = floor.cells[int(py / floor.pitch), int(px / floor.pitch)] / 255.0
+    else:
+        along = radius * (cos * turn_cos + sin * turn_sin)
+        across = radius * (sin * turn_cos - cos * turn_sin)
+        total = 0.0
+        for k in range(_DISC.shape[0]):
+            dx = along * _DISC[k, 0] - across * _DISC[k, 1]
+            dy = across * _DISC[k, 0] + along * _DISC[k, 1]
+            total += floor_brightness(floor.cells, floor.pitch, px + dx, py + dy)
+        share = total / (255.0 * _DISC.shape[0])
     return p.black + (p.white - p.black) * share
+
+
+@kernel
+def is_even(floor: Surface, x: float, y: float, radius: float) -> bool:
+    """Whether all cells within a radius of a point on the floor [m], and those beside them, are of one brightness."""
+    row, column = int(y / (BLOCK * floor.pitch)), int(x / (BLOCK * floor.pitch))
+    inside = x >= 0.0 and y >= 0.0 and row < floor.even.shape[0] and column < floor.even.shape[1]
+    return inside and floor.even[row, column] * floor.pitch > radius + floor.pitch
 
 
 @kernel
