@@ -101,6 +101,27 @@ def test_an_interval_that_contains_neutral_is_told() -> None:
 
 
 @pytest.mark.parametrize(
+    ("effect", "label", "value", "near", "contained"),
+    [
+        ("track_width", "scale", 0.9988, 0.9998, True),
+        ("track_width", "scale", 0.9988, 1.0002, True),
+        ("track_width", "scale", 0.9988, 0.9993, False),
+        ("track_width", "scale", 1.0012, 1.0002, True),
+        ("track_width", "scale", 1.0012, 1.0007, False),
+        ("speed_limit", "speed_rad_s", 10.0, 50.0, True),
+        ("speed_limit", "speed_rad_s", 10.0, 11.0, False),
+    ],
+)
+def test_what_one_of_so_many_effects_comes_to_by_chance_is_not_named(
+    effect: str, label: str, value: float, near: float, contained: bool
+) -> None:
+    model = SimpleNamespace(parameters=free(EV3, [effect]))
+    far = value - 0.1 if near > value else value + 0.1
+    spans = {effect: {label: Interval(value, *sorted((near, far)), "-")}}
+    assert contains_neutral(model, effect, spans) is contained  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
     ("low", "grip", "named"), [(0.04, 0.8, True), (0.03, 0.8, False), (0.03, 0.4, True), (0.0, 0.5, False)]
 )
 def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: float, named: bool) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtrit
+from scipy.special import ndtri, stdtrit
 
 from gecar.reality.fitting.estimator import Estimator
 from gecar.reality.fitting.gain_offset import gain_intervals
@@ -27,6 +27,9 @@ from gecar.world.effects import BY_ID
 Array = npt.NDArray[np.float64]
 
 NORMAL_95 = 1.96
+# Half 95 % intervals from neutral at which one of all effects of the catalogue is by chance in one robot of twenty
+# (Bonferroni's correction).
+BY_CHANCE = float(ndtri(1.0 - 0.025 / len(BY_ID))) / NORMAL_95
 KNOWN = 3.0  # times its lower end, the upper end of a radius that is known
 FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
 FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
@@ -77,7 +80,7 @@ def model_error(c: Coordinate, z: float) -> float:
 
 
 def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
-    """Whether the interval of an effect's size holds its neutral value.
+    """Whether the interval of an effect's size holds its neutral value, or would as that of one of the whole catalogue.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
     what they gain together decides.
@@ -85,11 +88,25 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
     if BY_ID[effect].at_a_place:
         return not _is_place(model, spans[effect])
     sizes = [
-        (spans[effect][c.parameter.label], c.value(0.0))
+        (c, spans[effect][c.parameter.label])
         for c in model.parameters.coordinates
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
-    return len(sizes) == 1 and sizes[0][0].low <= sizes[0][1] <= sizes[0][0].high
+    return len(sizes) == 1 and _is_near_neutral(*sizes[0])
+
+
+def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
+    """Whether a parameter is no farther from neutral than its interval reaches, or `BY_CHANCE` times that.
+
+    That of a size that is known by its product with another parameter runs along a valley, which may never come there.
+    """
+    neutral = c.value(0.0)
+    if span.low <= neutral <= span.high:
+        return True
+    if len(c.effect.parameters) > 1:
+        return False
+    z, end = c.at(span.value), c.at(span.low if span.value > neutral else span.high)
+    return abs(z) < BY_CHANCE * abs(z - end)
 
 
 def weakest_absent(
