@@ -44,7 +44,7 @@ class Surface(NamedTuple):
     pitch
         Edge of a cell [m].
     even
-        How many cells around each block of `BLOCK` x `BLOCK` have its brightness, shape (rows, columns) of blocks.
+        How many cells, at least, around each block of `BLOCK` x `BLOCK` have its brightness, shape (rows, columns).
     """
 
     cells: npt.NDArray[np.uint8]
@@ -63,7 +63,7 @@ def surface(cells: npt.NDArray[np.uint8], pitch: float) -> Surface:
     darkest = scipy.ndimage.minimum_filter(blocks.min((1, 3)), 3, mode="constant", cval=255)
     brightest = scipy.ndimage.maximum_filter(blocks.max((1, 3)), 3, mode="constant", cval=255)
     even = scipy.ndimage.distance_transform_cdt(darkest == brightest, "chessboard")
-    return Surface(cells, pitch, (BLOCK * even).astype(np.int32))
+    return Surface(cells, pitch, (BLOCK * even.clip(0)).astype(np.int32))  # -1 where nothing is drawn at all
 
 
 def spot_average(raster: npt.NDArray[np.uint8], pitch: float, diameter: float) -> npt.NDArray[np.float32]:
