@@ -23,7 +23,7 @@ def drawn(tmp_path_factory):
     out = tmp_path_factory.mktemp("best")
     with pytest.MonkeyPatch.context() as patch:
         for module in (cases, best_test):
-            patch.setattr(module, "SECONDS", 3.0)
+            patch.setattr(module, "SECONDS", 2.0)
         patch.setattr(cases, "draw_setting", lambda *_: Setting(EV3, ("holds", "line"), 100.0, 1))
         for number, (name, effect) in enumerate(SINGLES.items()):
             draw_case(name, "single", (effect,), (number,), out, Manner("continuous", background=True))

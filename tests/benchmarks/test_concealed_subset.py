@@ -16,6 +16,13 @@ from gecar.reality.discovery import discover
 from gecar.reality.recordings.recording import read_case
 
 FEW = "holds", "line", "reversals"  # recordings, where more than these would cost minutes and prove no more
+SHORT = 8.0  # s, each
+
+
+@pytest.fixture(autouse=True)
+def few_and_short(monkeypatch):
+    monkeypatch.setattr(cases, "RUNS", FEW)
+    monkeypatch.setattr(cases, "SECONDS", SHORT)
 
 
 def examined(kind, effects, seed, out):
@@ -25,19 +32,16 @@ def examined(kind, effects, seed, out):
     return judge(read_label(out, "case"), verdict, sight(out, "case"))
 
 
-def test_nothing_concealed_is_given_no_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "RUNS", FEW)
+def test_nothing_concealed_is_given_no_name(tmp_path):
     assert examined("none", (), 1, tmp_path).named == ()
 
 
-def test_concealed_effect_is_named_alone_and_located(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "RUNS", FEW)
+def test_concealed_effect_is_named_alone_and_located(tmp_path):
     judged = examined("single", ("motor_gain_asymmetry",), 1, tmp_path)
     assert judged.exact
     assert judged.channel_right
     assert judged.gap_closed > 0.8
 
 
-def test_physics_outside_the_catalogue_is_given_no_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(cases, "RUNS", FEW)
+def test_physics_outside_the_catalogue_is_given_no_name(tmp_path):
     assert examined("outside", ("magnet",), 1, tmp_path).abstained

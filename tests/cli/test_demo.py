@@ -19,7 +19,7 @@ def shown(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("demo"))
         patch.setattr(demo, "DRIVES", 1)
-        patch.setattr(demo, "EXERCISES", ("reversals", "full steps"))
+        patch.setattr(demo, "EXERCISES", ("reversals",))
         assert call("demo", *QUICK) == 0
         yield Path("shown").resolve()
 
