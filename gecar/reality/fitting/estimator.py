@@ -158,9 +158,10 @@ class Estimator:
         return self._once_near(model, RIPPLE, lambda errors: ripples(self.robot, self.recordings, errors))
 
     def _once_near(self, model: Model, effect: str, replay: Callable[[Errors], Iterable[T]]) -> list[T]:
-        """Return what replays of one more effect give, in units of the sensors' noise: once for all models near.
+        """Replay one more effect on top of a model, or return what was replayed for a model near it.
 
-        Something small changes the residuals of such models alike, and to know it takes hundreds of replays.
+        In units of the sensors' noise. Something small changes the residuals of such models alike, and to know it takes
+        hundreds of replays.
         """
         known = next((known for other, known in self._responses if model.is_near(other)), None)
         if known is None:

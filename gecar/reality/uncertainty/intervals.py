@@ -80,7 +80,7 @@ def model_error(c: Coordinate, z: float) -> float:
 
 
 def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
-    """Whether the interval of an effect's size holds its neutral value, or would as that of one of the whole catalogue.
+    """Whether an effect may as well be absent: its interval holds the neutral value, or nearly, as one of many tried.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
     what they gain together decides.
@@ -96,9 +96,10 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
 
 
 def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
-    """Whether a parameter is no farther from neutral than its interval reaches, or `BY_CHANCE` times that.
+    """Whether a parameter's interval holds its neutral value, or would if it were `BY_CHANCE` times as long.
 
-    That of a size that is known by its product with another parameter runs along a valley, which may never come there.
+    A size that is known by its product with another parameter has the first alone: its interval runs along a valley,
+    which may never come to neutral.
     """
     neutral = c.value(0.0)
     if span.low <= neutral <= span.high:

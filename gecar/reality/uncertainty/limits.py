@@ -81,11 +81,11 @@ class _Asked(NamedTuple):
 
 
 _Asking = Generator[_Asked, Array, float]
-"""What asks for residuals on its way, is sent them, shape (m, n), and returns a number."""
+"""A calculation that asks for residuals, is sent them, shape (m, n), and returns a number at its end."""
 
 
 def _in_step(searches: Sequence[_Asking]) -> list[float]:
-    """Return what searches find. What they ask for is replayed together, in half to a third of the time."""
+    """Run searches side by side and return what each finds: replays together take a half to a third of the time."""
     found, asked = np.zeros(len(searches)), {k: next(search) for k, search in enumerate(searches)}
     while asked:
         answers = dict[int, Array]()

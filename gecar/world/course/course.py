@@ -190,7 +190,7 @@ class Course(Displayed):
 
     @cached_property
     def surface(self) -> Surface:
-        """The floor as fits look at it."""
+        """The floor's cells, and where they are alike: what fits predict readings from."""
         return surface(self.raster(self.pitch_m), self.pitch_m)
 
     def averaged(self, spot_m: float) -> npt.NDArray[np.float32]:

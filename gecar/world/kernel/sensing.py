@@ -35,7 +35,7 @@ BLOCK = 4  # cells across a block
 
 
 class Surface(NamedTuple):
-    """A floor as fits look at it, where the spot differs from call to call; make it with `surface`.
+    """A floor's cells, and where they are alike: what fits predict readings from; make it with `surface`.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ class Surface(NamedTuple):
 
 
 def surface(cells: npt.NDArray[np.uint8], pitch: float) -> Surface:
-    """Return a floor of cells, 255 bare and 0 line, shape (rows, columns), each of this size [m], as fits look at it.
+    """Find where a floor is even: for most of a drive the spot lies there, and one cell says as much as its average.
 
-    Most of a drive the spot lies on even floor: there one cell says as much as its average.
+    ``cells`` and ``pitch`` are as in `Surface`.
     """
     beyond = [(0, -size % BLOCK) for size in cells.shape]
     filled = np.pad(cells, beyond, constant_values=255)
@@ -124,14 +124,21 @@ def glance(
     front, left
         How far this sensor sits to the front and to the left of its nominal place [m].
     """
-    aside = p.sensor_left + left
     ahead = p.sensor_ahead + front - p.com_ahead
-    x = s.x + ahead * s.cos - aside * s.sin - p.line_dx
-    y = s.y + ahead * s.sin + aside * s.cos - p.line_dy
-    if p.line_angle != 0.0:
-        cos, sin = math.cos(p.line_angle), math.sin(p.line_angle)
-        x, y = x * cos + y * sin, y * cos - x * sin
+    x, y = _where_drawn(s.x, s.y, s.cos, s.sin, ahead, p.sensor_left + left, p)
     return p.black + (p.white - p.black) * floor_brightness(averaged, pitch, x, y) / 255.0
+
+
+@kernel
+def _where_drawn(
+    x: float, y: float, cos: float, sin: float, ahead: float, aside: float, p: Any
+) -> tuple[float, float]:
+    """Return where the floor under a sensor is drawn [m], as the course may lie displaced."""
+    x, y = x + ahead * cos - aside * sin - p.line_dx, y + ahead * sin + aside * cos - p.line_dy
+    if p.line_angle == 0.0:
+        return x, y
+    turn_cos, turn_sin = math.cos(p.line_angle), math.sin(p.line_angle)
+    return x * turn_cos + y * turn_sin, y * turn_cos - x * turn_sin
 
 
 @kernel
@@ -178,18 +185,12 @@ def spot_reflection(
     p
         Record of dtype `PHYSICS`.
     """
-    ahead = p.sensor_ahead + front
-    aside = p.sensor_left + left
+    px, py = _where_drawn(x, y, cos, sin, p.sensor_ahead + front, p.sensor_left + left, p)
     radius = 0.5 * spot_reach(floor.pitch, p.spot_diameter)
-    # The course may lie displaced: look where the floor under the spot is drawn.
-    turn_cos = math.cos(p.line_angle)
-    turn_sin = math.sin(p.line_angle)
-    px = x + ahead * cos - aside * sin - p.line_dx
-    py = y + ahead * sin + aside * cos - p.line_dy
-    px, py = px * turn_cos + py * turn_sin, py * turn_cos - px * turn_sin
     if is_even(floor, px, py, radius):
         share = floor.cells[int(py / floor.pitch), int(px / floor.pitch)] / 255.0
     else:
+        turn_cos, turn_sin = math.cos(p.line_angle), math.sin(p.line_angle)
         along = radius * (cos * turn_cos + sin * turn_sin)
         across = radius * (sin * turn_cos - cos * turn_sin)
         total = 0.0
