@@ -144,9 +144,7 @@ def crossing(robot, seconds=0.6, dt=0.002):
     """Predicted readings of a sensor that is carried over the line at 0.25 m/s, from white to black to white."""
     t = np.arange(0.0, seconds, dt)
     path = np.column_stack([0.02 + 0.25 * t, np.full_like(t, 0.6), np.zeros_like(t)])
-    readings = np.zeros_like(t)
-    readings_along(t, path, 0.0, 1e-3, SURFACE, robot.physics, np.zeros(3), readings)
-    return readings
+    return readings_along(t, path, 0.0, 1e-3, SURFACE, robot.physics, np.zeros(3))
 
 
 def test_a_late_sensor_is_predicted_to_report_what_it_saw_before():

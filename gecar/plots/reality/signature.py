@@ -121,18 +121,8 @@ def _driven(robot: Robot, course: Course) -> _Drive:
     columns |= {name: np.full(len(t), value) for name, value in frames.items()}
     replayer = replayer_of(make_recording("signature", columns, Setup(course="none", duty_cap=1.0)))
     rows, _, poses, _ = replayer.play(robot.physics, START)
-    reflection = np.empty(len(t))
     path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
-    readings_along(
-        replayer.t,
-        path,
-        0.0,
-        QUIET_PCT,
-        course.surface,
-        robot.physics,
-        np.zeros(3),
-        reflection,
-    )
+    reflection = readings_along(replayer.t, path, 0.0, QUIET_PCT, course.surface, robot.physics, np.zeros(3))
     rows[:, [X, Y, HEADING]] = poses  # what a camera sees: late, where poses are
     return _Drive(replayer.t, rows, reflection)
 

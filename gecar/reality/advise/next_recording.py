@@ -20,7 +20,6 @@ from gecar.reality.replay.reflectance import readings_along
 from gecar.reality.replay.replayer import replayer_of
 from gecar.reality.residuals.of_recording import RecordingResiduals
 from gecar.reality.verdict import Found, Invented, Limit, NextRecording
-from gecar.world.course.course import Course
 from gecar.world.robot import Robot
 from gecar.world.terms import Term
 
@@ -201,14 +200,11 @@ def difference(commands: Commands, robot: Robot, rival: Robot, like: RecordingRe
     if course is None:
         return apart
     path = np.ascontiguousarray(rows[:, [X, Y, HEADING]])
-    own, other = (_readings(replayer.t, path, course, r, noise.reflection_sd) for r in (robot, rival))
+    own, other = (
+        readings_along(replayer.t, path, 0.0, noise.reflection_sd, course.surface, each.physics, np.zeros(3))
+        for each in (robot, rival)
+    )
     return apart + float(np.sum((own - other) ** 2)) / noise.reflection_sd**2
-
-
-def _readings(t: Array, path: Array, course: Course, robot: Robot, sd: float) -> Array:
-    readings = np.empty(len(t))
-    readings_along(t, path, 0.0, sd, course.surface, robot.physics, np.zeros(3), readings)
-    return readings
 
 
 def _recording(commands: Commands, seen: dict[str, Array], like: Recording) -> Recording:

@@ -278,8 +278,9 @@ def _against_replay(
 def _readings(replayed: Replay, robot: Robot, course: Course) -> Array:
     """Return what the colour sensor would read along a replay [%]."""
     path = np.column_stack([replayed.x_m, replayed.y_m, replayed.heading_rad])
-    readings, still = np.empty(len(path)), np.zeros(3)
-    readings_along(replayed.t_s, path, 0.0, _QUIET_PCT, course.surface, robot.physics, still, readings)
+    readings: Array = readings_along(
+        replayed.t_s, path, 0.0, _QUIET_PCT, course.surface, robot.physics, np.zeros(3)
+    )
     return readings
 
 

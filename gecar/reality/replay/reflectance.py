@@ -89,9 +89,8 @@ def readings_along(
     floor: Surface,
     physics: npt.NDArray[Any],
     shift: Array,
-    readings: Array,
-) -> None:
-    """Predict the reflection at every row.
+) -> Array:
+    """Return the reflection predicted at every row [%], shape (rows,).
 
     Parameters
     ----------
@@ -107,10 +106,9 @@ def readings_along(
         Record of dtype `PHYSICS`, shape (1,).
     shift
         Moves the whole path [m, m, rad], shape (3,): to see how much a pose's error matters.
-    readings
-        Overwritten [%], shape (rows,).
     """
     p = physics[0]
+    readings = np.empty(t.shape[0])
     pose, k = np.zeros(3), 0
     before = now = 0.0
     for i in range(t.shape[0]):
@@ -134,3 +132,4 @@ def readings_along(
             x, y, heading = pose[0] + shift[0], pose[1] + shift[1], pose[2] + shift[2]
             level += colour_error(t[i], x, y, heading, level, p)
         readings[i] = _clipped_mean(level, noise)
+    return readings

@@ -224,9 +224,8 @@ class RecordingResiduals:
         self, path: Array, physics: Physics, shift: Array = NO_SHIFT, late: float = 0.0, every: int = 1
     ) -> Array:
         assert self.course is not None
-        t = self.replayer.t[::every]
-        readings = np.empty(len(t))
-        readings_along(t, path, late, self.noise.reflection_sd, self.course.surface, physics, shift, readings)
+        t, sd = self.replayer.t[::every], self.noise.reflection_sd
+        readings: Array = readings_along(t, path, late, sd, self.course.surface, physics, shift)
         return readings
 
 

@@ -178,8 +178,7 @@ class _ReadingMisfit:
         physics["sensor_lag"] = max(physics["sensor_lag"][0] + lag, 0.0)
         physics["sensor_ahead"] += ahead
         physics["sensor_left"] += left
-        out = np.empty(len(self._t))
-        readings_along(self._t, fit.path, -delay, 1.0, self._floor, physics, np.zeros(3), out)
+        out: Array = readings_along(self._t, fit.path, -delay, 1.0, self._floor, physics, np.zeros(3))
         return out
 
     def errors(self, fit: _Fit, spot_m: float = 0.0) -> Array:
