@@ -65,6 +65,16 @@ def test_a_clock_that_is_early_by_the_same_everywhere_is_no_late_camera(
     assert explained.problem.residuals.clock_offsets_s == pytest.approx(expected, abs=0.002)
 
 
+def test_clocks_fitted_beside_a_late_camera_are_late_by_that_too() -> None:
+    """The delay is no effect any more once clocks are fitted: 100 ms common to all were lost with it."""
+    offsets = (0.08, 0.10, 0.12)
+    problem = problem_of(beside(*offsets), EV3, ("rotor_inertia", "pose_delay"))
+    delayed = problem.estimator.fit(("pose_delay",), {"pose_delay": {"time_s": 0.05}})
+    fitted = problem.with_clocks(delayed)
+    assert fitted is not None
+    assert fitted.residuals.clock_offsets_s == pytest.approx(offsets, abs=0.002)
+
+
 @pytest.mark.parametrize(
     ("effect", "fitted", "wheels", "instead"),
     [

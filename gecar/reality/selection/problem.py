@@ -290,20 +290,22 @@ class Problem:
         """Return the problem with camera clocks fitted under a model; None where too little is gained by it.
 
         That is ``least_gain``, or what a name costs. Clocks late by the same time in all recordings are a late camera,
-        an effect; no camera is early, but its clocks may be. Once they are fitted, a late camera is no effect any more.
+        an effect; no camera is early, but its clocks may be. Once they are fitted, a late camera is no effect any more:
+        what a model has of it is the clocks'.
         """
         if self.clocks_fitted or self.residuals.sensor:
             return None
         fitted, _ = with_fitted_clocks(self.residuals, model.physics)
         before, after = (self.estimator.cost_of(r.errors(model.physics)) for r in (self.residuals, fitted))
-        offsets = fitted.clock_offsets_s
+        common = float((model.physics[COMMON_DELAY] - self.known.physics[COMMON_DELAY])[0])
+        offsets = fitted.clock_offsets_s + common
         early, differ = float(np.mean(offsets)) < 0.0, scattered(offsets)
         if before - after < max(least_gain, PRICE) or not (self.is_only_one or early or differ):
             return None
         late = "differs from recording to recording" if differ else "is early" if early else "is late"
         self.tell(f"the camera's clock {late}: it is fitted")
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        return replace(self._on(fitted), catalogue=others, clocks_fitted=True)
+        return replace(self._on(fitted.with_clock_offsets(offsets)), catalogue=others, clocks_fitted=True)
 
     def with_clocks_beside(self, model: Model) -> Problem | None:
         """Fit the camera's clocks anew beside a model's effects, and laws; None where too little is gained by it.
