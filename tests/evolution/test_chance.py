@@ -40,7 +40,7 @@ from gecar.world.rollout import Driver, Fleet, Outcome, World, simulate
 
 WORLD = World(load_robot("ev3"), load_course("paper"))
 STEADY = parse_program("if(SensorValue > 75):\n    motor(50,60,10)\nelse:\n    motor(30,-60,10)").opcodes
-FRAGILE = parse_program("if(SensorValue > 55):\n    motor(80,90,10)\nelse:\n    motor(20,-80,30)").opcodes
+FRAGILE = parse_program("if(SensorValue > 40):\n    motor(100,100,10)\nelse:\n    motor(0,-90,20)").opcodes
 LEAVES = parse_program("motor(80,80,100)").opcodes
 
 

@@ -47,7 +47,13 @@ def _repaid(free, before, stood, due, dry, rotor):
     return free + due * (1.0 / rotor), pull if before == 0.0 and due == 0.0 else 0.0
 
 
-def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold against the kernel
+def _should_have_given(earlier, asked, asks, push):
+    rise = asks - earlier
+    share = min(max((asked - earlier) / rise, 0.0), 1.0) if rise != 0.0 else 1.0
+    return earlier + share * (push - earlier)
+
+
+def nominal_run(duties, robot):  # noqa: C901, PLR0915 - one plain loop to hold against the kernel
     """Return the centre of mass and the left shaft's angle after every step, three arrays of shape (steps,)."""
     body, motor = robot.body, robot.motor
     k = (motor.torque_constant * motor.back_emf_constant / motor.resistance) * DT / motor.inertia
@@ -63,7 +69,9 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
     alone = own * aside - cross * cross
     n_own, n_side, n_ss = aside / alone, cross / alone, own / alone
     load = rotor / (1.0 - m_own * r * r * inv_j)
-    slides_l = slides_r = False
+    slides_l = slides_r = slid_l = slid_r = False
+    held_l = held_r = False
+    latest_l = latest_r = earlier_l = earlier_r = asks_l = asks_r = asked_l = asked_r = 0.0
     weight, gain = body.mass * GRAVITY, DT * motor.torque_constant / (rotor * motor.resistance)
     dry, voltage, mass_w = motor.coulomb_friction * DT, robot.battery.voltage, 1.0 / own
     caster_static = weight * body.com_ahead / body.caster_ahead
@@ -75,6 +83,19 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
         half = 0.5 * DT * yaw
         cos, sin = _turned(cos, sin, half)
         u, w = vx * cos + vy * sin, vy * cos - vx * sin
+        back_l = back_r = 0.0
+        if held_l and slides_l:
+            back_l = _should_have_given(earlier_l, asked_l, asks_l, pl) - latest_l
+        if held_r and slides_r:
+            back_r = _should_have_given(earlier_r, asked_r, asks_r, pr) - latest_r
+        u, yaw = u + (back_l + back_r) * inv_m, yaw + (back_r - back_l) * a * inv_i
+        wl, wr = wl - back_l * r * inv_j, wr - back_r * r * inv_j
+        held_l, held_r, slid_l, slid_r = not slid_l, not slid_r, slides_l, slides_r
+        earlier_l, earlier_r, latest_l, latest_r = latest_l, latest_r, pl, pr
+        asked_l, asked_r = asks_l, asks_r
+        sl, sr, ss = wl * r - (u - yaw * a), wr * r - (u + yaw * a), -(w + yaw * e)
+        asks_l = -(m_own * sl + m_both * sr + m_side * ss)
+        asks_r = -(m_own * sr + m_both * sl + -m_side * ss)
         stood_l, stood_r, was_l, was_r = was_l == 0.0, was_r == 0.0, wl, wr
         wl, due_l = _repaid(keep * wl + gain * dl * voltage, was_l, stood_l, due_l, known, rotor)
         wr, due_r = _repaid(keep * wr + gain * dr * voltage, was_r, stood_r, due_r, known, rotor)
@@ -86,12 +107,15 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
         loads = [min(max(wheel - shift, 0.0), 2.0 * wheel), min(max(wheel + shift, 0.0), 2.0 * wheel)]
         circles = [robot.tyre.friction * DT * load for load in loads]
         pl = pr = ql = qr = fl = fr = 0.0
-        for _ in range(SWEEPS):
+        for number in range(SWEEPS):
             new_fl, new_fr = _clip(fl - wl * rotor, dry), _clip(fr - wr * rotor, dry)
             wl, wr = wl + (new_fl - fl) * inv_j, wr + (new_fr - fr) * inv_j
             settled = (abs(new_fl) == dry or new_fl == fl) and (abs(new_fr) == dry or new_fr == fr)
             fl, fr = new_fl, new_fr
             sl, sr, ss = wl * r - (u - yaw * a), wr * r - (u + yaw * a), -(w + yaw * e)
+            if number == 0:
+                asks_l += m_own * sl + m_both * sr + m_side * ss
+                asks_r += m_own * sr + m_both * sl + -m_side * ss
             slide = [(pl + mass_w * sl, ql + mass_w * ss), (pr + mass_w * sr, qr + mass_w * ss)]
             (new_l, new_ql), (new_r, new_qr) = slide
             if not slides_l and not slides_r:
@@ -107,7 +131,8 @@ def nominal_run(duties, robot):  # noqa: PLR0915 - one plain loop to hold agains
             new_l, new_ql, slides_l = _circled(new_l, new_ql, circles[0], *slide[0])
             new_r, new_qr, slides_r = _circled(new_r, new_qr, circles[1], *slide[1])
             more_l, more_r, more_s = new_l - pl, new_r - pr, (new_ql + new_qr) - (ql + qr)
-            u, w = u + (more_l + more_r) * inv_m, w + more_s * inv_m
+            more_p = more_l + more_r
+            u, w = u + (more_p + half * more_s) * inv_m, w + (more_s - half * more_p) * inv_m
             yaw += ((more_r - more_l) * a + more_s * e) * inv_i
             wl, wr = wl - more_l * r * inv_j, wr - more_r * r * inv_j
             pl, pr, ql, qr = new_l, new_r, new_ql, new_qr

@@ -24,7 +24,7 @@ def release_contacts(s: Any) -> None:
 
 
 @kernel
-def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
+def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool = False) -> bool:
     """Go once over shafts, tyres and caster, and give each what it asks for or all it can get.
 
     Three sweeps suffice, and mostly one does.
@@ -37,6 +37,8 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
         False where the robot has no play and no drag at the caster; see `gecar.world.kernel.dynamics.begin_step`.
     terms
         Whether the robot has terms, which may move a wheel's contact ahead of the axle.
+    first
+        Whether this is a step's first sweep.
 
     Returns
     -------
@@ -44,7 +46,7 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False) -> bool:
         Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
     """
     settled = rub_shafts(s, c)
-    sliding = _roll(s, c, effects)
+    sliding = _roll(s, c, effects, first)
     if terms and c.apart != 0.0:
         _scrub(s, c)
         sliding = True
@@ -76,7 +78,7 @@ def rub_shafts(s: Any, c: Any) -> bool:
 
 
 @kernel
-def _roll(s: Any, c: Any, effects: bool) -> bool:
+def _roll(s: Any, c: Any, effects: bool, first: bool) -> bool:
     """Give both tyres the impulses that would end their slip, within their friction circles.
 
     Returns
@@ -84,15 +86,17 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     bool
         Whether a tyre slides, or the gears have play: another sweep is then needed.
     """
-    left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
-    right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
-    side_slip = -(s.w + s.yaw_rate * c.axle)
+    left_slip, right_slip, side_slip = _slips(s, c)
     plays_l, plays_r = effects and c.left_gap > 0.0, effects and c.right_gap > 0.0
     end_l, end_r = left_slip, right_slip
     if plays_l:
         end_l = separation(left_slip, s.left_push, s.left_play, c.left_gap, c.left_radius, c)
     if plays_r:
         end_r = separation(right_slip, s.right_push, s.right_play, c.right_gap, c.right_radius, c)
+    hold_l, hold_r = _hold(end_l, end_r, side_slip, c)
+    if first:
+        s.left_asks += hold_l
+        s.right_asks += hold_r
     # As if both slid: each on its own.
     slide_l, slide_ls = s.left_push + c.left_mass * end_l, s.left_side + c.left_mass * side_slip
     slide_r, slide_rs = s.right_push + c.right_mass * end_r, s.right_side + c.right_mass * side_slip
@@ -101,8 +105,7 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     free_r = s.right_slides != 0.0 or (plays_r and end_r == 0.0)
     if not free_l and not free_r:
         # Where both hold, they share the side force as they share the load.
-        left = s.left_push + (c.m_ll * end_l + c.m_lr * end_r + c.m_ls * side_slip)
-        right = s.right_push + (c.m_rr * end_r + c.m_lr * end_l + c.m_rs * side_slip)
+        left, right = s.left_push + hold_l, s.right_push + hold_r
         side = c.m_ls * end_l + c.m_rs * end_r + c.m_ss * side_slip
         share = side / max(s.left_circle + s.right_circle, 1e-30)
         left_side = s.left_side + share * s.left_circle
@@ -121,6 +124,22 @@ def _roll(s: Any, c: Any, effects: bool) -> bool:
     right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
     _push(s, left, right, left_side, right_side, c)
     return s.left_slides != 0.0 or s.right_slides != 0.0 or plays_l or plays_r
+
+
+@kernel
+def _slips(s: Any, c: Any) -> tuple[float, float, float]:
+    """Return the slips [m/s] of the left and the right tyre along the robot, and of both to the side."""
+    left = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
+    right = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
+    return left, right, -(s.w + s.yaw_rate * c.axle)
+
+
+@kernel
+def _hold(left_slip: float, right_slip: float, side_slip: float, c: Any) -> tuple[float, float]:
+    """Return the pushes [N s] of the left and the right tyre that end these slips, if both hold."""
+    left = c.m_ll * left_slip + c.m_lr * right_slip + c.m_ls * side_slip
+    right = c.m_rr * right_slip + c.m_lr * left_slip + c.m_rs * side_slip
+    return left, right
 
 
 @kernel
@@ -182,8 +201,7 @@ def _push(s: Any, left: float, right: float, left_side: float, right_side: float
     more_left = left - s.left_push
     more_right = right - s.right_push
     more_side = (left_side + right_side) - (s.left_side + s.right_side)
-    s.u += (more_left + more_right) * c.inv_mass
-    s.w += more_side * c.inv_mass
+    shove(s, more_left + more_right, more_side, c)
     s.yaw_rate += ((more_right - more_left) * c.half_track + more_side * c.axle) * c.inv_inertia
     s.left_speed -= more_left * c.left_radius * c.inv_rotor
     s.right_speed -= more_right * c.right_radius * c.inv_rotor
@@ -191,6 +209,63 @@ def _push(s: Any, left: float, right: float, left_side: float, right_side: float
     s.right_push = right
     s.left_side = left_side
     s.right_side = right_side
+
+
+@kernel
+def shove(s: Any, ahead: float, aside: float, c: Any) -> None:
+    """Let an impulse [N s] change the body's velocity.
+
+    Forces act at the time of the positions, half a step before the velocities they change: in between the heading
+    turns by ``half_turn``. Along the later heading the force that holds a robot on its curve would brake its turn,
+    by m d² w³ dt / 2 with the centre of mass d behind the axle.
+    """
+    s.u += (ahead + s.half_turn * aside) * c.inv_mass
+    s.w += (aside - s.half_turn * ahead) * c.inv_mass
+
+
+@kernel
+def repay_tyres(s: Any, c: Any) -> None:
+    """Put right what tyres gave in the step before the last, if they began to slide there; then remember the last one.
+
+    Commands change in the middle of a step, and a tyre holds until then. What it gave too much or too little comes two
+    steps late, which is second order in the step. Tyres behind a play are left out: they push from when it closes.
+    """
+    left = right = 0.0
+    if s.left_held * s.left_slides != 0.0 and c.left_gap == 0.0:
+        left = _owed(s.left_earlier, s.left_asked, s.left_asks, s.left_push) - s.left_latest
+    if s.right_held * s.right_slides != 0.0 and c.right_gap == 0.0:
+        right = _owed(s.right_earlier, s.right_asked, s.right_asks, s.right_push) - s.right_latest
+    s.u += (left + right) * c.inv_mass
+    s.yaw_rate += (right - left) * c.half_track * c.inv_inertia
+    s.left_speed -= left * c.left_radius * c.inv_rotor
+    s.right_speed -= right * c.right_radius * c.inv_rotor
+    s.left_held, s.right_held = 1.0 - s.left_slid, 1.0 - s.right_slid
+    s.left_slid, s.right_slid = s.left_slides, s.right_slides
+    s.left_earlier, s.right_earlier = s.left_latest, s.right_latest
+    s.left_latest, s.right_latest = s.left_push, s.right_push
+    s.left_asked, s.right_asked = s.left_asks, s.right_asks
+    left_slip, right_slip, side_slip = _slips(s, c)
+    left, right = _hold(left_slip, right_slip, side_slip, c)
+    # What is left of earlier slips is no part of what motors ask for.
+    s.left_asks, s.right_asks = -left, -right
+
+
+@kernel
+def _owed(earlier: float, asked: float, asks: float, push: float) -> float:
+    """Return what a tyre should have given in a step [N s]: what it gave before, and after, each for its share.
+
+    Parameters
+    ----------
+    earlier
+        Its push in the step before, in which it held.
+    asked, asks
+        What would have held it in the step, and in the next one: the first is the mean over the shares.
+    push
+        Its push in the next step, in which it slides.
+    """
+    rise = asks - earlier
+    share = min(max((asked - earlier) / rise, 0.0), 1.0) if rise != 0.0 else 1.0
+    return earlier + share * (push - earlier)
 
 
 @kernel
@@ -203,8 +278,7 @@ def _drag_caster(s: Any, c: Any) -> None:
         scale = s.caster_circle / math.sqrt(reach)
         push *= scale
         side *= scale
-    s.u += (push - s.caster_push) * c.inv_mass
-    s.w += (side - s.caster_side) * c.inv_mass
+    shove(s, push - s.caster_push, side - s.caster_side, c)
     s.yaw_rate += (side - s.caster_side) * c.caster * c.inv_inertia
     s.caster_push = push
     s.caster_side = side

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import blank, kernel, subroutine
-from gecar.world.kernel.contacts import release_contacts, sweep
+from gecar.world.kernel.contacts import release_contacts, repay_tyres, shove, sweep
 from gecar.world.kernel.laws import SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.motor import (
     battery_current,
@@ -95,11 +95,12 @@ def begin_step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, effe
         Whether another sweep would change nothing.
     """
     enter_step(s, c, effects)
+    repay_tyres(s, c)
     s.voltage = supply(s, p) if effects else p.voltage * p.supply_scale
     run_motors(s, left_duty, right_duty, 0.0, 0.0, p, c, effects)
     _set_budgets(s, p, c, effects)
     release_contacts(s)
-    return sweep(s, c, effects)
+    return sweep(s, c, effects, False, True)
 
 
 @kernel
@@ -157,6 +158,7 @@ def _ask(
 def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, asked: Any) -> bool:
     """Begin a step that was entered, as `begin_step` does, with what terms ask for, but for the robot's shape."""
     _force(s, asked, c)
+    repay_tyres(s, c)
     s.voltage = supply(s, p) + asked.supply_voltage
     left, right = left_duty + asked.left_command, right_duty + asked.right_command
     run_motors(s, left, right, asked.left_motor_torque, asked.right_motor_torque, p, c, True)
@@ -172,7 +174,7 @@ def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, 
     )
     s.caster_circle = max(s.caster_circle + asked.caster_friction * _caster_load(s, c) * c.dt, 0.0)
     release_contacts(s)
-    return sweep(s, c, True, True)
+    return sweep(s, c, True, True, True)
 
 
 @kernel
@@ -215,10 +217,9 @@ def reshape(p: Any, asked: Any, c: Any) -> None:
 @kernel
 def _force(s: Any, asked: Any, c: Any) -> None:
     """Let forces act on the body for a step."""
-    ahead = asked.force_ahead + asked.force_x * s.cos + asked.force_y * s.sin
-    aside = asked.force_aside + asked.force_y * s.cos - asked.force_x * s.sin
-    s.u += ahead * c.dt * c.inv_mass
-    s.w += aside * c.dt * c.inv_mass
+    shove(s, asked.force_ahead * c.dt, asked.force_aside * c.dt, c)
+    s.u += (asked.force_x * s.cos + asked.force_y * s.sin) * c.dt * c.inv_mass
+    s.w += (asked.force_y * s.cos - asked.force_x * s.sin) * c.dt * c.inv_mass
     s.yaw_rate += asked.yaw_moment * c.dt * c.inv_inertia
 
 

@@ -20,8 +20,12 @@ _STATE_FIELDS = (
     "left_duty right_duty left_integral right_integral battery_current "
     # the shafts' speeds before the step, and what dry friction has yet to give them [N m s]
     "left_before right_before left_due right_due "
+    # the tyres' pushes of the last steps, what would have held them, and whether they held or slid
+    "left_latest right_latest left_earlier right_earlier left_asks right_asks left_asked right_asked "
+    "left_slid right_slid left_held right_held "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
-    "half_turn u w left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
+    "half_turn u w "
+    "left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
 )
 _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
@@ -166,6 +170,9 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.left_angle = s.right_angle = s.left_speed = s.right_speed = s.left_play = s.right_play = for_zero
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = for_zero
     s.left_slides = s.right_slides = s.scrub = for_zero
+    s.left_latest = s.right_latest = s.left_earlier = s.right_earlier = for_zero
+    s.left_asked = s.right_asked = s.left_asks = s.right_asks = for_zero
+    s.left_slid = s.right_slid = s.left_held = s.right_held = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
     s.left_before = s.right_before = s.left_due = s.right_due = s.left_dry = s.right_dry = for_zero
