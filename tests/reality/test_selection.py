@@ -15,7 +15,7 @@ from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.materiality import Size
 from gecar.reality.noise.excess_energy import Blocks
-from gecar.reality.optimisation.least_squares import Minimum, cost, left_out_costs
+from gecar.reality.optimisation.least_squares import Minimum, cost, costs, left_out_costs
 from gecar.reality.prove import confirmation
 from gecar.reality.prove.confirmation import confirmed, dropped
 from gecar.reality.replay.channels import CHANNELS
@@ -166,6 +166,21 @@ def test_a_coordinate_that_stays_is_the_same_without_every_fold() -> None:
         rest = folds != k
         without = np.linalg.lstsq(a[rest, :2], beside[rest], rcond=None)[0]
         assert found[k] == pytest.approx(cost((beside - a[:, :2] @ without)[~rest]), rel=1e-2)
+
+
+def test_a_coordinate_of_which_derivatives_say_nothing_stays_where_it_is() -> None:
+    """A threshold between two levels of duty: at nothing, where it was put, the residuals jump."""
+    rng = np.random.default_rng(0)
+    a, folds = rng.normal(size=(60, 1)), np.repeat([0, 1, 2], 20)
+    y = 0.01 * rng.normal(size=60)
+
+    def residual(z: np.ndarray) -> np.ndarray:
+        return y - z[..., :1] @ a.T + np.where(z[..., 1:] > 5.0, 0.0, 30.0)
+
+    z, bounds = np.append(np.linalg.lstsq(a, y, rcond=None)[0], 6.0), (np.full(2, -9.0), np.full(2, 9.0))
+    minimum = Minimum(z, residual(z), cost(residual(z)))
+    found = left_out_costs(minimum, np.hstack([-a, np.zeros_like(a)]), bounds, residual, folds, 0.02)
+    assert found == pytest.approx(np.bincount(folds, costs(minimum.errors)), rel=0.2)
 
 
 def test_a_newton_step_that_leaves_the_range_of_its_derivatives_is_cut() -> None:

@@ -22,6 +22,7 @@ LIGHT = 1e-3  # damping at first
 STUCK = 1.0  # damping after which a step that does not help is one across a jump, or none is needed
 WORTH_A_JUMP = 0.01  # share of the cost that a step across one gains, or it is not the end of something
 HALVINGS = 5  # of a step that goes too far
+LEAST_TOLD = 0.25  # information: derivatives that know a coordinate to two units at best say nothing of it
 TOGETHER = 32  # vectors of residuals, a megabyte or less each
 
 
@@ -215,7 +216,8 @@ def left_out_costs(
     folds
         Fold of each residual, shape (n,).
     least
-        Coordinates of which the other folds hold no more than this share of the information become 0.
+        Coordinates of which the other folds hold no more than this share of the information become 0; those of which
+        derivatives say nothing, as of a threshold between two levels, stay as they are.
     still
         Which coordinates stay as they are, shape (k,); default: none.
 
@@ -225,8 +227,8 @@ def left_out_costs(
         Shape (largest fold + 1,); 0 for folds without residuals.
     """
     w, names = weights(minimum.errors), np.unique(folds)
-    moves = np.ones(len(minimum.z), bool) if still is None else ~still
     normal, starts, steps = slopes.T @ (w[:, None] * slopes), [], []
+    moves = (np.diag(normal) > LEAST_TOLD) & (True if still is None else ~still)
     for k in names:
         rows = folds == k
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])
