@@ -22,7 +22,7 @@ LIGHT = 1e-3  # damping at first
 STUCK = 1.0  # damping after which a step that does not help is one across a jump, or none is needed
 WORTH_A_JUMP = 0.01  # share of the cost that a step across one gains, or it is not the end of something
 HALVINGS = 5  # of a step that goes too far
-LEAST_TOLD = 0.25  # information: derivatives that know a coordinate to two units at best say nothing of it
+FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
 TOGETHER = 32  # vectors of residuals, a megabyte or less each
 
 
@@ -228,7 +228,9 @@ def left_out_costs(
     """
     w, names = weights(minimum.errors), np.unique(folds)
     normal, starts, steps = slopes.T @ (w[:, None] * slopes), [], []
-    moves = (np.diag(normal) > LEAST_TOLD) & (True if still is None else ~still)
+    moves = np.diag(normal) > FLAT**-2
+    if still is not None:
+        moves &= ~still
     for k in names:
         rows = folds == k
         rest = normal - slopes[rows].T @ (w[rows, None] * slopes[rows])

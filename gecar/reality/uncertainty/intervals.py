@@ -16,7 +16,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import Coordinate
 from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
-from gecar.reality.optimisation.least_squares import weights
+from gecar.reality.optimisation.least_squares import FLAT, weights
 from gecar.reality.residuals.of_recording import DISC_SPREAD
 from gecar.reality.selection.problem import SPOT_SIZE
 from gecar.reality.selection.thresholds import ALIKE
@@ -31,7 +31,6 @@ NORMAL_95 = 1.96
 # (Bonferroni's correction).
 BY_CHANCE = float(ndtri(1.0 - 0.025 / len(BY_ID))) / NORMAL_95
 KNOWN = 3.0  # times its lower end, the upper end of a radius that is known
-FLAT = 2.0  # coordinates: a standard deviation so large comes from derivatives that say nothing
 FLAT_RISE = TOLERANCE * RISE_95  # of cost: a profile along a flat parameter ends there
 
 

@@ -225,7 +225,7 @@ def shove(s: Any, ahead: float, aside: float, c: Any) -> None:
 
 @kernel
 def repay_tyres(s: Any, c: Any) -> None:
-    """Put right what tyres gave in the step before the last, if they began to slide there; then remember the last one.
+    """Correct what tyres gave in the step before the last, if they began to slide in it; then remember the last step.
 
     Commands change in the middle of a step, and a tyre holds until then. What it gave too much or too little comes two
     steps late, which is second order in the step. Tyres behind a play are left out: they push from when it closes.
@@ -252,7 +252,9 @@ def repay_tyres(s: Any, c: Any) -> None:
 
 @kernel
 def _owed(earlier: float, asked: float, asks: float, push: float) -> float:
-    """Return what a tyre should have given in a step [N s]: what it gave before, and after, each for its share.
+    """Return the push [N s] a tyre should have given in a step in which it began to slide.
+
+    It is the push of the step before until then, and that of the next step from then on, each for its share.
 
     Parameters
     ----------
