@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from support.concealing import EV3, recorded, verdict_on
 
 from gecar import notebook
 from gecar.errors import InputError
-from gecar.plots.reality.verdict import verdict_figures
+from gecar.plots.reality.verdict import regimes_figure, verdict_figures
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.initial_values import initial_values
 from gecar.reality.fitting.parameters import free
@@ -159,6 +160,14 @@ def test_all_pictures_are_drawn() -> None:
     verdict = verdict_on("actuation_delay", "time_s", 0.03)
     figures = verdict_figures(verdict)
     assert set(figures) == {"gap", "where", "tried", "traces", "map"}
+
+
+def test_where_no_channel_is_off_the_picture_says_so() -> None:
+    verdict = verdict_on("actuation_delay", "time_s", 0.03)
+    none = copy(verdict.evidence.where)
+    none.energy = np.minimum(none.energy, 0.0)
+    figure = regimes_figure(replace(verdict, evidence=replace(verdict.evidence, where=none)))
+    assert "no channel is off by more than its noise" in [text.get_text() for text in figure.texts]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")

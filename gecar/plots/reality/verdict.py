@@ -156,6 +156,8 @@ def regimes_figure(verdict: Verdict) -> Figure:
         [[_density(where, k, mask) for mask in where.masks.values()] for k in range(len(CHANNELS))]
     )
     rows = np.flatnonzero(~np.isnan(every).all(axis=1))
+    if not len(rows):
+        return _without_mismatch()
     density = every[rows]
     telling = np.argsort(-np.nan_to_num(np.log(np.maximum(density, 0.01))).max(axis=0))[:SHOWN_REGIMES]
     names = [list(where.masks)[k] for k in telling]
@@ -172,6 +174,15 @@ def regimes_figure(verdict: Verdict) -> Figure:
             "Where simulation and reality part",
             "mismatch of the robot as it was, by channel and motion",
         )
+    return figure
+
+
+def _without_mismatch() -> Figure:
+    """Say in the place of a picture that the robot as it was is off by no more than noise."""
+    figure = new_figure(8.6, 2.0)
+    with look():
+        figure.text(0.5, 0.4, "no channel is off by more than its noise", ha="center", color=SOFT)
+        headline(figure, "Where simulation and reality part", "nowhere")
     return figure
 
 
