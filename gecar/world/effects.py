@@ -17,6 +17,8 @@ from gecar.world.ports import N_TERMS, TERM_WIDTH
 
 DEG = math.pi / 180.0
 
+DUTY_LEVELS = "duty levels"
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -213,7 +215,7 @@ CATALOGUE: tuple[Effect, ...] = (
            (_P("dead_band", "duty_pct", "%", 0.0, 40.0, 0.0, 1.0, 0.01, model_error=0.05),
             _P("dead_band_offset", "offset_share", "-", 0.0, 1.0, 1.0, 0.0, shape_step=0.1)),
            ("motor",), "small duty", "dead zone of PWM drives; one EV3 motor did not move at 5 % duty",
-           scan="duty levels", search=Search(),
+           scan=DUTY_LEVELS, search=Search(),
            # friction holds 4 % of an EV3's duty anyway: a threshold without an offset must exceed it
            worth=({"duty_pct": 1.0, "offset_share": 0.3}, {"duty_pct": 5.0})),
     Effect("dead_band_asymmetry", "the small duty that gives no torque differs by motor or direction",

@@ -182,6 +182,20 @@ def test_a_size_known_by_its_product_with_a_share_is_not_neutral() -> None:
     assert 0.5 < spans[effect]["duty_pct"].low < 1.0 < spans[effect]["duty_pct"].high
 
 
+def test_a_threshold_between_two_levels_of_duty_is_put_into_the_middle() -> None:
+    """Of 20 % nothing comes; a step in which a command changes from 20 to 30 % has 25 %, and drives."""
+    effect = "dead_band"
+    runs = [
+        recorded(EV3.with_effects({effect: {"duty_pct": 22.0, "offset_share": 0.0}}), k) for k in range(3)
+    ]
+    estimator = problem_of(motion_of(runs), EV3, (effect,)).estimator
+    model = estimator.searched(estimator.fit((effect,), {effect: {"duty_pct": 29.0, "offset_share": 0.0}}))
+    found = intervals(estimator, model)[effect]["duty_pct"]
+    assert found.value == pytest.approx(22.5, abs=0.3)
+    assert 18.5 < found.low < 20.1
+    assert 24.9 < found.high < 26.5
+
+
 def test_parameters_known_by_their_product_alone_go_as_far_as_a_profile_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

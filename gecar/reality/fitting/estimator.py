@@ -21,6 +21,7 @@ from gecar.reality.fitting.initial_values import (
 )
 from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.fitting.parameters import free
+from gecar.reality.fitting.profile import RISE_95, reaches
 from gecar.reality.noise.excess_energy import Blocks
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import (
@@ -43,6 +44,7 @@ RIPPLE = "torque_ripple"
 CACHED_FITS = 2  # whose sensitivities are kept: ten megabytes each
 CACHED_RESPONSES = 4  # models whose responses are kept: tens of megabytes each
 REFINED_SPREAD = 0.25  # of a parameter's search spread: about a fit that least squares has refined
+CENTRINGS = 2  # from one side of a jump, across it, and once more about what is there
 FAINT = 1e-9  # a sensitivity that is none
 LEAST_NORM = 1e-6  # weighted sensitivities smaller than this say nothing
 
@@ -199,7 +201,25 @@ class Estimator:
         parameters, residual = model.parameters, self.residual(model.parameters)
         wide = np.array([spread * c.parameter.search_spread for c in parameters.coordinates])
         z, least = cma_es(lambda at: cost_of_each(residual, at), model.z, wide, parameters.bounds, self.rng)
-        return model if least >= model.cost else self.at(model, z)
+        return self._centred(model if least >= model.cost else self.at(model, z))
+
+    def _centred(self, model: Model) -> Model:
+        """Put each threshold that lies anywhere between two levels of duty into the middle of where it may lie.
+
+        Where commands leave a gap the fit tells nothing; elsewhere commands may fall into it.
+        """
+        nobody, residual = np.zeros(0, np.intp), self.residual(model.parameters)
+        for k, c in enumerate(model.parameters.coordinates):
+            for _ in range(CENTRINGS if c.is_threshold else 0):
+                down, up = reaches(residual, model, k, nobody)
+                z = model.z.copy()
+                z[k] += 0.5 * (up - down)
+                centred = self.at(model, z)
+                # What is known as well as a size worth a name lies in no such gap.
+                if down + up < 1.0 or centred.cost > model.cost + RISE_95:
+                    break
+                model = centred
+        return model
 
     def sensitivities(self, model: Model, effects: Sequence[str]) -> list[Array]:
         """Return the residuals' derivatives by effects' parameters, the model's or one more, each of shape (n, k)."""

@@ -19,7 +19,7 @@ from gecar.reality.fitting.parameters import Coordinate, free, torque_scale
 from gecar.reality.optimisation.least_squares import cost, cost_of_each, residuals_of_each, weights
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import TIMING
-from gecar.world.effects import BY_ID
+from gecar.world.effects import BY_ID, DUTY_LEVELS
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -321,7 +321,7 @@ def _mounts(robot: Robot) -> Iterator[Values]:
 Scan = Callable[[Robot, Sequence[Recording], Errors], Iterable[Values]]
 _SCANS: dict[str, Scan] = {
     "slow speeds": lambda robot, recordings, errors: _slow_speeds(robot, recordings),  # noqa: ARG005
-    "duty levels": lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
+    DUTY_LEVELS: lambda robot, recordings, errors: _duty_levels(recordings),  # noqa: ARG005
     "floor cells": lambda robot, recordings, errors: _floor_cells(recordings, errors),  # noqa: ARG005
     "shares of stall current": lambda robot, recordings, errors: _currents(robot),  # noqa: ARG005
     "shares of top speed": lambda robot, recordings, errors: _top_speeds(robot, recordings),  # noqa: ARG005

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gecar.world.effects import BY_ID, Effect, Parameter
+from gecar.world.effects import BY_ID, DUTY_LEVELS, Effect, Parameter
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -52,6 +52,11 @@ class Coordinate:
     def ratio(self) -> bool:
         """Whether it acts by its ratio."""
         return self.parameter.by_ratio
+
+    @property
+    def is_threshold(self) -> bool:
+        """Whether commands below it do nothing: between two levels of duty it may lie anywhere."""
+        return self.effect.scan == DUTY_LEVELS and self.parameter.worthwhile > 0.0
 
     @property
     def step(self) -> float:

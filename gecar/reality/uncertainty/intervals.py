@@ -170,7 +170,7 @@ def intervals(estimator: Estimator, model: Model, seed: int = 0) -> dict[str, di
             down, up = spans[k]
         elif half > NORMAL_95 * FLAT or (abs(z) <= half and _is_one_of_several(model, k)):
             down, up = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
-        elif curved[k]:
+        elif curved[k] or c.is_threshold:
             profile = reaches(residual, model, k, everything[everything != k], FLAT_RISE)
             down, up = (max(float(half), reach) for reach in profile)
         else:
