@@ -9,13 +9,17 @@ from pathlib import Path
 
 import pytest
 from support.command import Command
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from gecar.compiled import is_cold, mark_warm
 from gecar.reality.residuals import compilation, threads
 
-# Tests run on every core: a second thread would cost each discovery a quarter more processor time.
+# Tests run on every core: a second thread would cost each discovery a quarter more processor time, and those of linear
+# algebra wait for each other in busy loops. Processes that tests start inherit the variable.
 if "PYTEST_XDIST_WORKER" in os.environ:
     threads.CORES = 1
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    threadpool_limits(1)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
