@@ -526,6 +526,15 @@ def test_an_only_law_that_is_an_effect_is_told_as_that_effect():
     assert not explained.steps
 
 
+def test_an_only_law_makes_room_for_an_effect_that_explains_more():
+    """A lag is much like a delay of 60 ms, and unlike its derivative."""
+    language = parse_grammar("<term> ::= command: c * (store - command); store: command; store_s: 0.1")
+    robot = EV3.with_effects({"actuation_delay": {"time_s": 0.06}})
+    written = invention.invent(*with_nothing_named(robot, "actuation_delay"), language)
+    assert written.terms == written.invented == ()
+    assert [step.effect for step in written.explained.steps] == ["actuation_delay"]
+
+
 @pytest.mark.parametrize(("c1", "left"), [(-1e-7, []), (-3e-4, ["c1 * speed * abs(speed)"])])
 def test_a_law_that_an_effect_makes_idle_goes(c1, left):
     drag = Term(**{**dict(DRAG), "c1": c1})
@@ -544,7 +553,7 @@ def test_a_law_that_an_effect_makes_idle_goes(c1, left):
     assert found.explained.taken.effects == ("viscous_friction",)
 
 
-def test_a_law_beside_others_goes_as_a_whole_and_a_sum_part_by_part():
+def test_a_law_goes_as_a_whole_and_a_sum_part_by_part():
     scrub, drag = (
         Term(**dict(SCRUB)),
         Term(port="motor_torque", law="c1 * speed + c2 * sign(speed)", c1=-1.0, c2=-2.0),
@@ -554,7 +563,7 @@ def test_a_law_beside_others_goes_as_a_whole_and_a_sum_part_by_part():
     assert [[term.law for term in terms] for terms, _ in shorter] == [
         [drag.law], [scrub.law, "c1 * sign(speed)"], [scrub.law, "c1 * speed"]
     ]  # fmt: skip
-    assert not list(beside._shorter(Written(None, (scrub,), ("scrubs",))))
+    assert list(beside._shorter(Written(None, (scrub,), ("scrubs",)))) == [((), ())]
 
 
 def with_rough_bearings(coefficient_nms):

@@ -104,7 +104,7 @@ def _as_effect(written: Written, first: Explanation) -> Written:
 
 
 def _in_place_of_laws(written: Written, first: Explanation, held: Residuals) -> Written:
-    """Exchange a law beside others, or a part of its sum, for an effect that explains about as much, until none does.
+    """Exchange a law, or a part of its sum, for an effect that explains about as much, until none does.
 
     A cause of the catalogue goes before a part of a law, unless it explains less by what a name costs.
     """
@@ -138,7 +138,7 @@ def _shorter(written: Written) -> Iterator[tuple[Laws, tuple[Invented, ...]]]:
         before, after = written.terms[:k], written.terms[k + 1 :]
         for fewer in shortened((law,)):
             yield (*before, *fewer, *after), written.invented
-        if len(pieces(law)) == 1 and (before or after):
+        if len(pieces(law)) == 1:
             yield _without_law(written, k)
 
 
