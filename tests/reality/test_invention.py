@@ -154,6 +154,23 @@ def library_on(runs):
     return Library(problem, problem.known)
 
 
+def test_a_force_comes_from_a_point_that_is_known():
+    """A cable tells where it is tied; what is felt within 13 mm of a point that no drive came near may be anywhere."""
+    cable = {"port": "force_toward", "law": "c1 * distance", "c1": 0.8, "at_x": 1.5, "at_y": 0.4}
+    felt = {
+        "port": "force_toward",
+        "law": "c1 * exp(-distance / k1)",
+        "c1": -1.0,
+        "k1": 0.05,
+        "at_x": 1.2,
+        "at_y": 0.5,
+    }
+    library = library_of(cable)
+    assert invention._from_a_point(library, fit(library, (Term(**cable),)))
+    assert not invention._from_a_point(library, fit(library, (Term(**felt),)))
+    assert invention._from_a_point(library, fit(library, (Term(**dict(DRAG)),)))
+
+
 def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     library = library_of(DRAG)
     sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"

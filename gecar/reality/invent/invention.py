@@ -20,11 +20,12 @@ import numpy.typing as npt
 from gecar.language.grammar import Grammar
 from gecar.reality.fitting.model import Step
 from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects, without_absent
+from gecar.reality.invent.free_terms import POINT_STEP_M
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key, looking_at, single_laws
 from gecar.reality.invent.states import Physics, ranges, states
-from gecar.reality.invent.written import Written, added, with_constants_of
+from gecar.reality.invent.written import Written, added, half_widths_of_constants, with_constants_of
 from gecar.reality.materiality import Size
 from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.holdout import Contender, gaps
@@ -36,7 +37,7 @@ from gecar.reality.selection.share import LEAST_SHOWN, share_asked_for, spread_o
 from gecar.reality.selection.stepwise import Explanation, left_before
 from gecar.reality.selection.thresholds import CLOSE, DRIFTING, PRICE
 from gecar.reality.verdict import Invented
-from gecar.world.ports import AT_A_POINT, N_TERMS, PORTS
+from gecar.world.ports import AT_A_POINT, AT_X, AT_Y, N_TERMS, PORTS
 from gecar.world.terms import Term
 
 Array = npt.NDArray[np.float64]
@@ -49,11 +50,15 @@ HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of 
 # 0.24; right ones that leave as much spread by 0.01 to 0.13.
 MUCH, MOST, UNEVEN = 4.0, 0.4, 0.16
 MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
+POINT_KNOWN_M = (
+    0.25  # a robot's length and its wheels' width: to so much the point a force comes from is known
+)
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
 OF_BOTH_MOTORS = frozenset(("other_command",))  # of laws that act while both are driven
 OF_PAIR = OF_BOTH_MOTORS | {"side", "other_angle", "other_speed"}  # and that one motor alone has not
+FROM_A_POINT = "force_toward"  # the port of forces toward a point or away from it
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
@@ -225,7 +230,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _beyond_path(library, law):
+        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _is_anywhere(library, law):
             yield law, proof
         if len(tried) == TRIED:
             return
@@ -252,6 +257,28 @@ def _leaves_more(after: Explanation, before: Explanation) -> bool:
     """Whether a law takes whole drives farther from what was measured: it fits short windows of them only."""
     material = after.problem.material
     return not after.problem.on_bench and material.times(after.left) > material.times(before.left)
+
+
+def _is_anywhere(library: Library, law: Law) -> bool:
+    """Whether what a law says of a place is known: where the colour sensor is, and from which point a force comes."""
+    return _beyond_path(library, law) and _from_a_point(library, law)
+
+
+def _from_a_point(library: Library, law: Law) -> bool:
+    """Whether the point from which a force comes is known better than the robot came near it; true of all others.
+
+    What is felt near a point alone would explain whatever happened once, wherever that was.
+    """
+    toward = [number for number, term in enumerate(law.terms) if term.port == FROM_A_POINT]
+    if not toward:
+        return True
+    constants, minimum = law.parameters.constants, law.minimum
+    at = [k for k, c in enumerate(constants) if c.term in toward and c.slot in (AT_X, AT_Y)]
+    half = half_widths_of_constants(library.problem, law.parameters, minimum.z, minimum.errors)[at]
+    runs, physics = library.problem.residuals.recordings, law.parameters.physics(minimum.z)
+    tables = [states(run, physics, law.terms[number]) for number in toward for run in runs]
+    nearest = min(float(table["distance"].min()) for table in tables)
+    return bool((POINT_STEP_M * half < max(POINT_KNOWN_M, nearest)).all())
 
 
 def _beyond_path(library: Library, law: Law) -> bool:

@@ -139,9 +139,7 @@ def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, .
     model, problem = written.explained.taken, written.explained.problem
     parameters = free(first.problem.estimator.robot, model.effects)
     both = FreeTerms(parameters, model.z, written.terms)
-    residual = problem.estimator.residual(both)
-    slopes = jacobian(residual, both.z, model.errors, both.probes, both.bounds[1])
-    half = half_widths_of(slopes, model.errors, problem.estimator.blocks)[parameters.size :]
+    half = half_widths_of_constants(problem, both, both.z, model.errors)
     intervals: list[dict[str, Interval]] = [{} for _ in written.terms]
     for c, reach in zip(both.constants, half.tolist(), strict=True):
         ends = sorted(float(c.at(side * min(reach, FARTHEST))) for side in (-1.0, 1.0))
@@ -154,6 +152,12 @@ def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, .
         replace(_as_written(law, term, written), term=term, parameters=found, looks_like=looks_like(term))
         for law, term, found in told
     )
+
+
+def half_widths_of_constants(problem: Problem, free: FreeTerms, z: Array, errors: Array) -> Array:
+    """Return half the 95 % intervals of the laws' constants, in coordinates, from whitened residuals at a vector."""
+    slopes = jacobian(problem.estimator.residual(free), z, errors, free.probes, free.bounds[1])
+    return half_widths_of(slopes, errors, problem.estimator.blocks)[free.model.size :]
 
 
 def _as_written(law: Invented, term: Term, written: Written) -> Invented:
