@@ -197,16 +197,16 @@ class Estimator:
         return self.at(step.base, step.base.z), self.at(step.model, step.model.z)
 
     def searched(self, model: Model, spread: float = REFINED_SPREAD) -> Model:
-        """Search about a fit without derivatives; return the better one."""
+        """Search about a fit without derivatives; return the better one, its thresholds in the middle of their gaps."""
         parameters, residual = model.parameters, self.residual(model.parameters)
         wide = np.array([spread * c.parameter.search_spread for c in parameters.coordinates])
         z, least = cma_es(lambda at: cost_of_each(residual, at), model.z, wide, parameters.bounds, self.rng)
         return self._centred(model if least >= model.cost else self.at(model, z))
 
     def _centred(self, model: Model) -> Model:
-        """Put each threshold that lies anywhere between two levels of duty into the middle of where it may lie.
+        """Put each threshold that may lie anywhere between two levels of duty into the middle.
 
-        Where commands leave a gap the fit tells nothing; elsewhere commands may fall into it.
+        These commands leave a gap there; those of other recordings may fall into it.
         """
         nobody, residual = np.zeros(0, np.intp), self.residual(model.parameters)
         for k, c in enumerate(model.parameters.coordinates):

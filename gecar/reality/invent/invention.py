@@ -50,9 +50,8 @@ HELPS = 0.85  # of the gap of whole drives set aside without a law, in units of 
 # 0.24; right ones that leave as much spread by 0.01 to 0.13.
 MUCH, MOST, UNEVEN = 4.0, 0.4, 0.16
 MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
-POINT_KNOWN_M = (
-    0.25  # a robot's length and its wheels' width: to so much the point a force comes from is known
-)
+# About a robot's length: the point that a force comes from is known to so much, or to as near as the robot came.
+POINT_KNOWN_M = 0.25
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
@@ -230,7 +229,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _is_anywhere(library, law):
+        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _has_a_place(library, law):
             yield law, proof
         if len(tried) == TRIED:
             return
@@ -259,13 +258,13 @@ def _leaves_more(after: Explanation, before: Explanation) -> bool:
     return not after.problem.on_bench and material.times(after.left) > material.times(before.left)
 
 
-def _is_anywhere(library: Library, law: Law) -> bool:
+def _has_a_place(library: Library, law: Law) -> bool:
     """Whether what a law says of a place is known: where the colour sensor is, and from which point a force comes."""
     return _beyond_path(library, law) and _from_a_point(library, law)
 
 
 def _from_a_point(library: Library, law: Law) -> bool:
-    """Whether the point from which a force comes is known better than the robot came near it; true of all others.
+    """Whether the point a force comes from is known, to `POINT_KNOWN_M` or as near as the robot came; true of others.
 
     What is felt near a point alone would explain whatever happened once, wherever that was.
     """
