@@ -17,7 +17,7 @@ from gecar.world.ports import N_TERMS, TERM_WIDTH
 
 DEG = math.pi / 180.0
 
-DUTY_LEVELS = "duty levels"
+DUTY_LEVELS, SHAFT_CYCLES = "duty levels", "shaft cycles"  # scans that fits treat apart
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,7 @@ CATALOGUE: tuple[Effect, ...] = (
             _P("ripple_phase", "phase_rad", "rad", -math.pi, math.pi, 0.0, 0.0, shape_step=0.3),
             _P("ripple_lead", "right_lead_rad", "rad", -math.pi, math.pi, 0.0, 0.0, shape_step=0.3, search_spread=0.2)),
            ("motor",), "periodic in the shaft's angle", "cogging and gear mesh, first harmonic",
-           scan="shaft cycles", search=Search()),
+           scan=SHAFT_CYCLES, search=Search()),
     Effect("speed_limit", "firmware caps the speed",
            (_P("speed_limit", "speed_rad_s", "rad/s", 1.0, math.inf, math.inf, 0.0, 1.0, 11.0),),
            ("motor",), "high speed", "Motor.run caps the EV3 large motor at 800 deg/s",

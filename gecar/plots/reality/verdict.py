@@ -178,7 +178,7 @@ def regimes_figure(verdict: Verdict) -> Figure:
 
 
 def _without_mismatch() -> Figure:
-    """Say in the place of a picture that the robot as it was is off by no more than noise."""
+    """Return a figure that says that no channel is off by more than noise."""
     figure = new_figure(8.6, 2.0)
     with look():
         figure.text(0.5, 0.4, "no channel is off by more than its noise", ha="center", color=SOFT)

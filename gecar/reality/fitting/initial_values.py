@@ -19,7 +19,7 @@ from gecar.reality.fitting.parameters import Coordinate, free, torque_scale
 from gecar.reality.optimisation.least_squares import cost, cost_of_each, residuals_of_each, weights
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import TIMING
-from gecar.world.effects import BY_ID, DUTY_LEVELS
+from gecar.world.effects import BY_ID, DUTY_LEVELS, SHAFT_CYCLES
 from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,6 @@ Single = npt.NDArray[np.float32]
 Values = Mapping[str, float]
 Errors = Callable[[Sequence[Values]], Array]
 
-SHAFT_CYCLES = "shaft cycles"
 LEAST_CYCLES = 2.0
 SPEED_OVER_S = 0.1
 _SIZES = (0.5, 3.0, 12.0)  # in steps worth a name; where less is material, fits begin at less

@@ -55,7 +55,7 @@ class Coordinate:
 
     @property
     def is_threshold(self) -> bool:
-        """Whether commands below it do nothing: between two levels of duty it may lie anywhere."""
+        """Whether it is a duty below which nothing happens: between two commanded levels it may lie anywhere."""
         return self.effect.scan == DUTY_LEVELS and self.parameter.worthwhile > 0.0
 
     @property

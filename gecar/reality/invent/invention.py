@@ -20,7 +20,6 @@ import numpy.typing as npt
 from gecar.language.grammar import Grammar
 from gecar.reality.fitting.model import Step
 from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects, without_absent
-from gecar.reality.invent.free_terms import POINT_STEP_M
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
 from gecar.reality.invent.sentences import key, looking_at, single_laws
@@ -264,20 +263,21 @@ def _has_a_place(library: Library, law: Law) -> bool:
 
 
 def _from_a_point(library: Library, law: Law) -> bool:
-    """Whether the point a force comes from is known, to `POINT_KNOWN_M` or as near as the robot came; true of others.
+    """Whether it is known from which point a law's force comes; true of laws without such a point.
 
-    What is felt near a point alone would explain whatever happened once, wherever that was.
+    It must be known to `POINT_KNOWN_M`, or to as near as the robot came: what is felt near a point alone would explain
+    whatever happened once, wherever that was.
     """
     toward = [number for number, term in enumerate(law.terms) if term.port == FROM_A_POINT]
     if not toward:
         return True
     constants, minimum = law.parameters.constants, law.minimum
     at = [k for k, c in enumerate(constants) if c.term in toward and c.slot in (AT_X, AT_Y)]
-    half = half_widths_of_constants(library.problem, law.parameters, minimum.z, minimum.errors)[at]
+    half = half_widths_of_constants(library.problem, law.parameters, minimum.z, minimum.errors)
     runs, physics = library.problem.residuals.recordings, law.parameters.physics(minimum.z)
     tables = [states(run, physics, law.terms[number]) for number in toward for run in runs]
     nearest = min(float(table["distance"].min()) for table in tables)
-    return bool((POINT_STEP_M * half < max(POINT_KNOWN_M, nearest)).all())
+    return all(constants[k].step * half[k] < max(POINT_KNOWN_M, nearest) for k in at)
 
 
 def _beyond_path(library: Library, law: Law) -> bool:

@@ -155,7 +155,10 @@ def with_constants_of(written: Written, first: Explanation) -> tuple[Invented, .
 
 
 def half_widths_of_constants(problem: Problem, free: FreeTerms, z: Array, errors: Array) -> Array:
-    """Return half the 95 % intervals of the laws' constants, in coordinates, from whitened residuals at a vector."""
+    """Return half the 95 % intervals of laws' constants, in coordinates, shape (constants,).
+
+    ``z`` is the vector of the fit, and ``errors`` are its whitened residuals.
+    """
     slopes = jacobian(problem.estimator.residual(free), z, errors, free.probes, free.bounds[1])
     return half_widths_of(slopes, errors, problem.estimator.blocks)[free.model.size :]
 
