@@ -212,6 +212,23 @@ def test_a_ramp_turns_the_shaft_as_far_whatever_the_step(rate_pct_s):
     assert coarse == pytest.approx(fine, abs=1e-3)
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.55, 0.8])
+def test_gears_meet_in_time_wherever_in_a_step_they_do(phase):
+    """Tyres slide as gears meet: a step early, and the robot would be 0.3 mm off after a start and a reversal."""
+    robot = with_effect("backlash", angle_deg=2.4)
+    coarse, fine = (run(reversed_at(0.8 + phase * DT, dt, 1.4), robot, dt)["x"][-1] for dt in (DT, 2e-5))
+    assert coarse == pytest.approx(fine, abs=4e-5)
+
+
+def reversed_at(change, dt, seconds=0.3, duty=0.5):
+    """Duties of both motors that are reversed at a time [s], each the mean over a step that lies half a step back."""
+    begins = (np.arange(round(seconds / dt)) - 0.5) * dt
+    ahead = np.clip((change - begins) / dt, 0.0, 1.0)
+    duties = duty * (2.0 * ahead - 1.0)
+    duties[0] *= 0.5
+    return np.stack([duties, duties], axis=1)
+
+
 def ramped_angle(robot, dt):
     """Return how far a shaft turns in 0.3 s [rad], its command as late as commands are: half a step."""
     duties = hold(0.4, 0.4, 0.3, dt)

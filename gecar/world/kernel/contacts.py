@@ -21,6 +21,7 @@ def release_contacts(s: Any) -> None:
     """Take all impulses off; sweeps then find those of this step."""
     s.left_friction = s.right_friction = s.scrub = 0.0
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
+    s.left_closed = s.right_closed = 1.0
 
 
 @kernel
@@ -46,6 +47,8 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
         Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
     """
     settled = rub_shafts(s, c)
+    if effects and first:
+        _meet(s, c)
     sliding = _roll(s, c, effects, first)
     if terms and c.apart != 0.0:
         _scrub(s, c)
@@ -54,6 +57,18 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
         _drag_caster(s, c)
         return False
     return settled and not sliding
+
+
+@kernel
+def sweep_on(s: Any, c: Any, effects: bool, terms: bool = False) -> None:
+    """Sweep once or twice more; arguments as in `sweep`. Loads on wheels behind a play follow the impulses found."""
+    plays = effects and (c.left_gap > 0.0 or c.right_gap > 0.0)
+    if plays:
+        _shift_loads(s, c, False)
+    if not sweep(s, c, effects, terms):
+        if plays:
+            _shift_loads(s, c, True)
+        sweep(s, c, effects, terms)
 
 
 @kernel
@@ -120,10 +135,51 @@ def _roll(s: Any, c: Any, effects: bool, first: bool) -> bool:
         left, slide_l = _one_way(left, s.left_push, end_l), _one_way(slide_l, s.left_push, end_l)
     if plays_r:
         right, slide_r = _one_way(right, s.right_push, end_r), _one_way(slide_r, s.right_push, end_r)
-    left, left_side, s.left_slides = _within_circle(left, left_side, s.left_circle, slide_l, slide_ls)
-    right, right_side, s.right_slides = _within_circle(right, right_side, s.right_circle, slide_r, slide_rs)
+    left, left_side, s.left_slides = _within_circle(
+        left, left_side, s.left_circle, slide_l, slide_ls, s.left_closed
+    )
+    right, right_side, s.right_slides = _within_circle(
+        right, right_side, s.right_circle, slide_r, slide_rs, s.right_closed
+    )
     _push(s, left, right, left_side, right_side, c)
     return s.left_slides != 0.0 or s.right_slides != 0.0 or plays_l or plays_r
+
+
+@kernel
+def _shift_loads(s: Any, c: Any, aside: bool) -> None:
+    """Let the circles of wheels behind a play follow the loads that this step's impulses shift.
+
+    Loads are else those of the step before, in which a gear that closes did not push yet. A wheel that slides pushes
+    with all it has, and so changes its own load: that is solved for (Newton's method). What shifts ``aside`` is known
+    after two sweeps, as the first does not know yet which tyre slides; two find by how much it changes.
+    """
+    left = s.left_push / max(s.left_closed, 1e-30) if s.left_slides != 0.0 else s.left_push
+    right = s.right_push / max(s.right_closed, 1e-30) if s.right_slides != 0.0 else s.right_push
+    shift = caster_load((left + right + s.caster_push) * c.inv_dt, c) - s.caster_load
+    s.caster_load += shift / (1.0 + 0.5 * s.grip * abs(c.caster_arm) * (s.left_slides + s.right_slides))
+    if aside:
+        found = s.left_side + s.right_side + s.caster_side
+        s.aside += found - s.aside_found
+        s.aside_found = found
+    left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
+    s.left_circle *= left / max(s.left_bears, 1e-30)
+    s.right_circle *= right / max(s.right_bears, 1e-30)
+    s.left_bears, s.right_bears = left, right
+
+
+@kernel
+def caster_load(ahead: float, c: Any) -> float:
+    """Return the load on the caster [N] under a force ahead [N]: its share of the weight, and what the force shifts."""
+    return min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
+
+
+@kernel
+def wheel_loads(caster: float, aside: float, c: Any) -> tuple[float, float]:
+    """Return the loads on the left and the right wheel [N], given the caster's and a force to the left [N]."""
+    wheel = 0.5 * (c.weight - caster)
+    left = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
+    right = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
+    return left, right
 
 
 @kernel
@@ -175,6 +231,32 @@ def separation(slip: float, push: float, play: float, gap: float, radius: float,
 
 
 @kernel
+def _meet(s: Any, c: Any) -> None:
+    """Set for what share of the step tyres behind a play can pull."""
+    left_slip, right_slip, _ = _slips(s, c)
+    if c.left_gap > 0.0:
+        end = separation(left_slip, 0.0, s.left_play, c.left_gap, c.left_radius, c)
+        s.left_closed, s.left_opened = _closed(left_slip, end, s.left_play, c.left_gap, s.left_opened)
+    if c.right_gap > 0.0:
+        end = separation(right_slip, 0.0, s.right_play, c.right_gap, c.right_radius, c)
+        s.right_closed, s.right_opened = _closed(right_slip, end, s.right_play, c.right_gap, s.right_opened)
+
+
+@kernel
+def _closed(slip: float, end: float, play: float, gap: float, opened: float) -> tuple[float, float]:
+    """Return the share of the step for which a tyre behind a play can pull, and that for which its gear was open.
+
+    A gear that closes within the step, after a share f of it, pulls for the rest. A force that sets in there moves what
+    it pulls by (1 - f)²/2 of what it does in a whole step, and by the end of the next step by 3/2 - f: so the next step
+    has 1 - f²/2 of it. ``opened`` is f of the step before.
+    """
+    if end == 0.0 or abs(play) == gap:
+        return 1.0 - 0.5 * opened * opened, 0.0
+    closed = end / slip
+    return 0.5 * closed * closed, 1.0 - closed
+
+
+@kernel
 def _one_way(new: float, old: float, end: float) -> float:
     """Keep a gear's push from changing sides within a sweep, and from acting inside the gap."""
     if old > 0.0:
@@ -186,13 +268,16 @@ def _one_way(new: float, old: float, end: float) -> float:
 
 @kernel
 def _within_circle(
-    push: float, side: float, circle: float, slide_push: float, slide_side: float
+    push: float, side: float, circle: float, slide_push: float, slide_side: float, closed: float
 ) -> tuple[float, float, float]:
-    """Return a tyre's impulses, and 1 if it slides, else 0; a sliding tyre pulls along its slip, with all it has."""
-    if push * push + side * side <= circle * circle:
+    """Return a tyre's impulses, and 1 if it slides, else 0; a sliding tyre pulls along its slip, with all it has.
+
+    Along the robot it does so for the share of the step in which its gear is ``closed``.
+    """
+    if push * push + side * side <= circle * circle and abs(push) <= closed * circle:
         return push, side, 0.0
     scale = circle / math.sqrt(slide_push * slide_push + slide_side * slide_side + 1e-30)
-    return slide_push * scale, slide_side * scale, 1.0
+    return slide_push * scale * closed, slide_side * scale, 1.0
 
 
 @kernel

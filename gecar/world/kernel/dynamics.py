@@ -16,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import blank, kernel, subroutine
-from gecar.world.kernel.contacts import release_contacts, repay_tyres, shove, sweep
+from gecar.world.kernel.contacts import (
+    caster_load,
+    release_contacts,
+    repay_tyres,
+    shove,
+    sweep,
+    sweep_on,
+    wheel_loads,
+)
 from gecar.world.kernel.laws import SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.motor import (
     battery_current,
@@ -77,8 +85,8 @@ def step(s: Any, left_duty: float, right_duty: float, p: Any, c: Any) -> None:
         Records of dtypes `PHYSICS` and `DERIVED`.
     """
     settled = begin_step(s, left_duty, right_duty, p, c, True)
-    if not settled and not sweep(s, c, True):
-        sweep(s, c, True)
+    if not settled:
+        sweep_on(s, c, True)
     end_step(s, p, c, True)
 
 
@@ -132,8 +140,8 @@ def step_with_terms(
     asked = load_asked(scratch, 1, 0)
     if asked.shape_terms > 0.0:
         reshape(p, asked, c)
-    if not begin_as_asked(s, left_duty, right_duty, p, c, asked) and not sweep(s, c, True, True):
-        sweep(s, c, True, True)
+    if not begin_as_asked(s, left_duty, right_duty, p, c, asked):
+        sweep_on(s, c, True, True)
     end_step(s, p, c, True)
 
 
@@ -287,24 +295,22 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
     wheel to wheel.
     """
-    aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
-    caster = _caster_load(s, c)
-    wheel = 0.5 * (c.weight - caster)
-    left = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
-    right = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
+    s.caster_load = _caster_load(s, c)
+    s.aside = s.left_side + s.right_side + s.caster_side
+    left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
+    s.left_bears, s.right_bears = left, right
     s.left_dry = friction_budget(s.left_speed, left, c.left_radius, p, c, effects)
     s.right_dry = friction_budget(s.right_speed, right, c.right_radius, p, c, effects)
-    grip = (_grip(s, p) if effects else p.tyre_friction) * c.dt
-    s.left_circle = grip * left
-    s.right_circle = grip * right
-    s.caster_circle = p.caster_friction * caster * c.dt
+    s.grip = _grip(s, p) if effects else p.tyre_friction
+    s.left_circle = s.grip * c.dt * left
+    s.right_circle = s.grip * c.dt * right
+    s.caster_circle = p.caster_friction * s.caster_load * c.dt
 
 
 @kernel
 def _caster_load(s: Any, c: Any) -> float:
-    """Return the load on the caster [N]: its share of the weight, and what speeding up or braking shifts onto it."""
-    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
-    return min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)
+    """Return the load on the caster [N] by the last step's impulses."""
+    return caster_load((s.left_push + s.right_push + s.caster_push) * c.inv_dt, c)
 
 
 @kernel

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from gecar.compiled import any_integer, blank, kernel, lane_access, numbers
 from gecar.world.effects import PHYSICS
-from gecar.world.kernel.contacts import sweep
+from gecar.world.kernel.contacts import sweep_on
 from gecar.world.kernel.dynamics import begin_as_asked, begin_step, drift, end_step, enter_step, reshape
 from gecar.world.kernel.laws import N_SCRATCH, VIEW, load_asked, store_view
 from gecar.world.kernel.state import DERIVED, STATE
@@ -132,8 +132,8 @@ def _finish(flat: npt.NDArray[np.float64], lanes: int, effects: bool, terms: boo
             s = load_state(flat, lanes, lane)
             c = load_derived(flat, lanes, lane)
             a = load_acting(flat, lanes, lane)
-            if a.settled == 0.0 and not sweep(s, c, effects, terms):
-                sweep(s, c, effects, terms)
+            if a.settled == 0.0:
+                sweep_on(s, c, effects, terms)
             store_state(flat, lanes, lane, s)
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)

@@ -23,9 +23,13 @@ _STATE_FIELDS = (
     # the tyres' pushes of the last steps, what would have held them, and whether they held or slid
     "left_latest right_latest left_earlier right_earlier left_asks right_asks left_asked right_asked "
     "left_slid right_slid left_held right_held "
+    # for what share of the last step gears that closed in it had been open
+    "left_opened right_opened aside_found "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
     "half_turn u w "
-    "left_dry right_dry left_circle right_circle caster_circle left_drive right_drive voltage"
+    "left_dry right_dry left_circle right_circle caster_circle grip left_closed right_closed "
+    "left_bears right_bears caster_load aside "
+    "left_drive right_drive voltage"
 )
 _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
@@ -173,6 +177,7 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.left_latest = s.right_latest = s.left_earlier = s.right_earlier = for_zero
     s.left_asked = s.right_asked = s.left_asks = s.right_asks = for_zero
     s.left_slid = s.right_slid = s.left_held = s.right_held = for_zero
+    s.left_opened = s.right_opened = s.aside_found = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
     s.left_before = s.right_before = s.left_due = s.right_due = s.left_dry = s.right_dry = for_zero
