@@ -112,8 +112,10 @@ def run_motors(
         if p.regulated != 0.0:
             left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
             right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
-        s.left_duty, left_duty, left_sudden = slewed(awake(left_duty, s.t, p, c), s.left_duty, c)
-        s.right_duty, right_duty, right_sudden = slewed(awake(right_duty, s.t, p, c), s.right_duty, c)
+        left_duty, right_duty = awake(left_duty, s.t, p, c), awake(right_duty, s.t, p, c)
+        if p.command_slew < math.inf:
+            left_duty, left_sudden = _ramp_left(s, left_duty, c)
+            right_duty, right_sudden = _ramp_right(s, right_duty, c)
     s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
     s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
     if effects:
@@ -220,18 +222,56 @@ def battery_current(s: Any, p: Any) -> float:
 
 
 @kernel
-def slewed(duty: float, last: float, c: Any) -> tuple[float, float, float]:
-    """Return the duty that a ramp reaches in a step, the mean that acts in it, and the share of the step left then.
+def _ramp_left(s: Any, duty: float, c: Any) -> tuple[float, float]:
+    """Return the left motor's mean duty in a step, which follows the command only so fast, and the step's share left.
 
-    It goes ``slew`` from the last duty at most; without a ramp all of the step is left. What acts is the mean over a
-    step that lies half a step back, as for all commands (`gecar.world.kernel.state`): on the way it is the last duty. A
-    ramp that acted with what it reaches would be a whole step early.
+    That is what is left when the ramp ends. The mean holds what earlier means owe.
     """
-    rise = duty - last
-    if abs(rise) > c.slew:
-        return last + math.copysign(c.slew, rise), last, 0.0
-    taken = abs(rise) / c.slew
-    return duty, duty - rise * taken, 1.0 - taken
+    s.left_began, owes = slewed(s.left_began, s.left_earlier_command, s.left_command, duty, c)
+    s.left_duty, taken, mean = _towards(s.left_began, duty, 1.0, c)
+    owes -= s.left_mean
+    s.left_earlier_command, s.left_command, s.left_mean = s.left_command, duty, mean
+    return mean + owes, 1.0 - taken
+
+
+@kernel
+def _ramp_right(s: Any, duty: float, c: Any) -> tuple[float, float]:
+    """Do the same for the right motor."""
+    s.right_began, owes = slewed(s.right_began, s.right_earlier_command, s.right_command, duty, c)
+    s.right_duty, taken, mean = _towards(s.right_began, duty, 1.0, c)
+    owes -= s.right_mean
+    s.right_earlier_command, s.right_command, s.right_mean = s.right_command, duty, mean
+    return mean + owes, 1.0 - taken
+
+
+@kernel
+def slewed(last: float, earlier: float, now: float, later: float, c: Any) -> tuple[float, float]:
+    """Return the duty that a ramp reached at the end of the step before, and its mean over that step.
+
+    A command that changes within a step is known by its mean alone. Those of the steps before and after tell when it
+    changed: what a ramp did is known a step late, which is second order in the step.
+
+    Parameters
+    ----------
+    last
+        The duty at the beginning of that step.
+    earlier, now, later
+        The mean commands of the step before it, of that step, and of the next one.
+    """
+    jump = earlier - later
+    share = min(max((now - later) / jump, 0.0), 1.0) if jump != 0.0 else 0.0
+    duty, _, before = _towards(last, earlier, share, c)
+    duty, _, after = _towards(duty, later, 1.0 - share, c)
+    return duty, before + after
+
+
+@kernel
+def _towards(duty: float, command: float, share: float, c: Any) -> tuple[float, float, float]:
+    """Return the duty a ramp reaches in a share of a step, the share it took, and the duty's integral in steps."""
+    rise = command - duty
+    taken = min(abs(rise) / c.slew, share)
+    reached = duty + math.copysign(taken * c.slew, rise) if taken == share else command
+    return reached, taken, 0.5 * (duty + reached) * taken + command * (share - taken)
 
 
 @kernel

@@ -18,6 +18,8 @@ _STATE_FIELDS = (
     "left_push right_push left_side right_side caster_push caster_side "
     "left_friction right_friction left_slides right_slides scrub "
     "left_duty right_duty left_integral right_integral battery_current "
+    # where duties ramp: those at the beginning of the last step and on the mean, and the commands of the last two
+    "left_began right_began left_mean right_mean left_command right_command left_earlier_command right_earlier_command "
     # the shafts' speeds before the step, and what dry friction has yet to give them [N m s]
     "left_before right_before left_due right_due "
     # the tyres' pushes of the last steps, what would have held them, and whether they held or slid
@@ -180,6 +182,8 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.left_opened = s.right_opened = s.aside_found = for_zero
     s.left_friction = s.right_friction = s.left_duty = s.right_duty = for_zero
     s.left_integral = s.right_integral = s.battery_current = for_zero
+    s.left_command = s.right_command = s.left_earlier_command = s.right_earlier_command = for_zero
+    s.left_began = s.right_began = s.left_mean = s.right_mean = for_zero
     s.left_before = s.right_before = s.left_due = s.right_due = s.left_dry = s.right_dry = for_zero
     s.heading = heading
     s.cos = math.cos(heading)
