@@ -171,6 +171,28 @@ def test_a_force_comes_from_a_point_that_is_known():
     assert invention._from_a_point(library, fit(library, (Term(**dict(DRAG)),)))
 
 
+def test_a_camera_that_drifts_does_not_turn_about_a_point_far_off():
+    """What a carpet's nap did was told as a camera that turns by -1.1 mrad/s (-3.2 to 1.1) about a point 4 m off."""
+    runs = [recorded(EV3, seed) for seed in range(4)]
+    near = Term(port="pose_turn", law="c1 * time", c1=0.004, at_x=1.1, at_y=0.6)
+    far = Term(port="pose_turn", law="c1 * time", c1=-0.001, at_x=-1.7, at_y=4.0)
+    turning, drifting = (
+        library_on([seen(run) for run in runs])
+        for seen in (lambda run: turned(run, 0.004), lambda run: replace(run, x_m=run.x_m + 0.003 * run.t_s))
+    )
+    assert invention._turns(turning, fit(turning, (near,)))
+    assert not invention._turns(drifting, fit(drifting, (far,)))
+
+
+def turned(run, rate_rad_s):
+    """A drive as a camera saw it that turned about (1.1, 0.6) m."""
+    x, y, angle = run.x_m - 1.1, run.y_m - 0.6, rate_rad_s * run.t_s
+    cos, sin = np.cos(angle), np.sin(angle)
+    return replace(
+        run, x_m=1.1 + x * cos - y * sin, y_m=0.6 + x * sin + y * cos, heading_rad=run.heading_rad + angle
+    )
+
+
 def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     library = library_of(DRAG)
     sum_of_three = "motor_torque: c * speed * abs(speed) + c * sin(2 * angle) + c * cos(3 * angle)"

@@ -22,7 +22,7 @@ from gecar.reality.fitting.model import Step
 from gecar.reality.invent.beside import held_up, pruned, taken_back, with_effects, without_absent
 from gecar.reality.invent.proof import Proof, largest_gains, simplified
 from gecar.reality.invent.search import Law, Library, fit, search
-from gecar.reality.invent.sentences import key, looking_at, single_laws
+from gecar.reality.invent.sentences import key, linear, looking_at, single_laws
 from gecar.reality.invent.states import Physics, ranges, states
 from gecar.reality.invent.written import Written, added, half_widths_of_constants, with_constants_of
 from gecar.reality.materiality import Size
@@ -57,6 +57,7 @@ OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and tha
 OF_BOTH_MOTORS = frozenset(("other_command",))  # of laws that act while both are driven
 OF_PAIR = OF_BOTH_MOTORS | {"side", "other_angle", "other_speed"}  # and that one motor alone has not
 FROM_A_POINT = "force_toward"  # the port of forces toward a point or away from it
+ABOUT_A_POINT = "pose_turn"  # the port of a camera's frame that turns about a point
 ON_FLOOR = frozenset(("force_x", "force_y", *AT_A_POINT))  # ports that have the floor's axes
 
 
@@ -228,7 +229,7 @@ def _proved(library: Library, found: Sequence[Law], nulls: Array) -> Iterator[tu
             continue
         tried.add(key(law.terms))
         proof = Proof(gains, nulls)
-        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _has_a_place(library, law):
+        if law.worth >= PRICE and proof.holds and _has_one_size(library, law) and _is_known(library, law):
             yield law, proof
         if len(tried) == TRIED:
             return
@@ -257,9 +258,31 @@ def _leaves_more(after: Explanation, before: Explanation) -> bool:
     return not after.problem.on_bench and material.times(after.left) > material.times(before.left)
 
 
-def _has_a_place(library: Library, law: Law) -> bool:
-    """Whether what a law says of a place is known: where the colour sensor is, and from which point a force comes."""
-    return _beyond_path(library, law) and _from_a_point(library, law)
+def _is_known(library: Library, law: Law) -> bool:
+    """Whether what a law says is known: where a sensor is, which point a force comes from, and if a frame turns."""
+    return _beyond_path(library, law) and _from_a_point(library, law) and _turns(library, law)
+
+
+def _turns(library: Library, law: Law) -> bool:
+    """Whether it is known that the camera's frame turns about a point; true of laws at other ports.
+
+    A frame that turns about a point far off drifts: how fast it turns is known no better than where that point is.
+    """
+    factors = [
+        (k, c)
+        for k, c in enumerate(law.parameters.constants)
+        if law.terms[c.term].port == ABOUT_A_POINT and c.name in linear(law.terms[c.term])
+    ]
+    if not factors:
+        return True
+    half, z = _half_widths(library, law), law.minimum.z[law.parameters.model.size :]
+    return any(abs(float(c.at(z[k]))) > c.step * half[k] for k, c in factors)
+
+
+def _half_widths(library: Library, law: Law) -> Array:
+    """Return half the 95 % intervals of a law's constants, in coordinates, shape (constants,)."""
+    minimum = law.minimum
+    return half_widths_of_constants(library.problem, law.parameters, minimum.z, minimum.errors)
 
 
 def _from_a_point(library: Library, law: Law) -> bool:
@@ -273,7 +296,7 @@ def _from_a_point(library: Library, law: Law) -> bool:
         return True
     constants, minimum = law.parameters.constants, law.minimum
     at = [k for k, c in enumerate(constants) if c.term in toward and c.slot in (AT_X, AT_Y)]
-    half = half_widths_of_constants(library.problem, law.parameters, minimum.z, minimum.errors)
+    half = _half_widths(library, law)
     runs, physics = library.problem.residuals.recordings, law.parameters.physics(minimum.z)
     tables = [states(run, physics, law.terms[number]) for number in toward for run in runs]
     nearest = min(float(table["distance"].min()) for table in tables)
