@@ -432,7 +432,7 @@ def _explain_sensor(
             seen = _readings_explained(replace(problem, catalogue=anywhere), beside)
             stands = standing_out(seen)
         seen = stands if motion.unexplained else seen
-    return _with_laws(context, _with_intervals(context, seen, beside))
+    return _with_laws(context, _with_intervals(context, seen, beside, motion.unexplained))
 
 
 def _readings_explained(problem: Problem, held: Residuals) -> Confirmation:
@@ -558,13 +558,18 @@ def _along_paths(residuals: Residuals, motion: Explanation, physics: npt.NDArray
     return residuals.localised(physics).with_paths(physics, motion.problem.slow_noise(motion.taken))
 
 
-def _with_intervals(context: _Context, confirmation: Confirmation, held: Residuals) -> _Stage:
-    """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate."""
+def _with_intervals(
+    context: _Context, confirmation: Confirmation, held: Residuals, doubtful: bool = False
+) -> _Stage:
+    """Return the intervals of what was confirmed; an effect that may as well be absent becomes a candidate.
+
+    Readings along a path that nothing explains are ``doubtful``.
+    """
     explained, candidates = confirmation.explained, confirmation.candidates
     context.tell("intervals")
     while True:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
-        weakest = weakest_absent(explained.taken, explained.steps, spans)
+        weakest = weakest_absent(explained.taken, explained.steps, spans, doubtful)
         if weakest is None:
             break
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)

@@ -131,6 +131,20 @@ def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: flo
     assert contains_neutral(model, "slippery_patch", {"slippery_patch": spans}) is not named  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("gain", "offset", "doubtful", "contained"),
+    [((0.99, 2.0), (-40.0, 0.2), True, True), ((0.99, 2.0), (-40.0, 0.2), False, False),
+     ((1.1, 2.0), (-40.0, 0.2), True, False)],
+)  # fmt: skip
+def test_gain_and_offset_may_both_be_neutral_but_not_along_a_path_in_doubt(
+    gain: tuple[float, float], offset: tuple[float, float], doubtful: bool, contained: bool
+) -> None:
+    """Beside motors that ignored commands, a white floor of 145 % (99 or more), 21 % less (0 or less), was named."""
+    model = SimpleNamespace(parameters=free(EV3, ["sensor_gain"]))
+    spans = {"gain": Interval(1.45, *gain, "-"), "offset_pct": Interval(-20.5, *offset, "%")}
+    assert contains_neutral(model, "sensor_gain", {"sensor_gain": spans}, doubtful) is contained  # type: ignore[arg-type]
+
+
 def test_an_effect_whose_interval_contains_neutral_is_a_candidate_and_not_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

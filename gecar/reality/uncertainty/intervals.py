@@ -78,11 +78,13 @@ def model_error(c: Coordinate, z: float) -> float:
     return 0.5 * (c.parameter.model_error * (1.0 if c.ratio else abs(z)) + step)
 
 
-def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]]) -> bool:
+def contains_neutral(
+    model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]], doubtful: bool = False
+) -> bool:
     """Whether an effect may as well be absent: its interval holds the neutral value, or nearly, as one of many tried.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
-    what they gain together decides.
+    what they gain together decides. Where that is ``doubtful``, one of them at least must not be.
     """
     if BY_ID[effect].at_a_place:
         return not _is_place(model, spans[effect])
@@ -91,7 +93,9 @@ def contains_neutral(model: Model, effect: str, spans: Mapping[str, Mapping[str,
         for c in model.parameters.coordinates
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
-    return len(sizes) == 1 and _is_near_neutral(*sizes[0])
+    if len(sizes) > 1:
+        return doubtful and all(span.low <= c.value(0.0) <= span.high for c, span in sizes)
+    return _is_near_neutral(*sizes[0])
 
 
 def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
@@ -110,10 +114,10 @@ def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
 
 
 def weakest_absent(
-    model: Model, steps: Sequence[Step], spans: Mapping[str, Mapping[str, Interval]]
+    model: Model, steps: Sequence[Step], spans: Mapping[str, Mapping[str, Interval]], doubtful: bool = False
 ) -> Step | None:
     """Return the effect that gains least of those whose intervals hold their neutral values; None if there is none."""
-    absent = [step for step in steps if contains_neutral(model, step.effect, spans)]
+    absent = [step for step in steps if contains_neutral(model, step.effect, spans, doubtful)]
     return min(absent, key=lambda step: step.gain, default=None)
 
 
