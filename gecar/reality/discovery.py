@@ -25,7 +25,7 @@ from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
 from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
-from gecar.reality.locate.hotspot import with_spot
+from gecar.reality.locate.hotspot import ABOUT_M, middle, strongest_place, with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
@@ -60,7 +60,7 @@ from gecar.reality.selection.stepwise import (
     likeliest,
     resumed,
 )
-from gecar.reality.selection.thresholds import NEGLIGIBLE, PRICE, SIGNIFICANCE
+from gecar.reality.selection.thresholds import HOTSPOT, NEGLIGIBLE, PRICE, SIGNIFICANCE
 from gecar.reality.uncertainty.intervals import hulls, intervals, weakest_absent
 from gecar.reality.uncertainty.limits import limits
 from gecar.reality.uncertainty.valleys import along_valleys, valleys
@@ -84,6 +84,7 @@ from gecar.world.terms import Term
 Spans = Mapping[str, Mapping[str, Interval]]
 
 MEMORY_S = 1.0  # over which replays are drawn back to the measurement
+ENOUGH_ELSEWHERE = 0.5  # share of the residuals away from a place that must be left
 FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wheels left 0.4
 # Laws in the place of effects must leave so much less, or explain so much more, than laws beside them; and laws where
 # nothing material is left must leave so much less than there was.
@@ -197,17 +198,16 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
     split, problem, held, seen = _with_logs_repaired(context, noise, threads)
     motion = _explain_motion(context, problem, held, seen)
-    fitted = _along_paths(
-        motion.explained.problem.residuals, motion.explained, motion.explained.taken.physics
-    )
+    explained = motion.explained
+    fitted = _along_paths(explained.problem.residuals.everywhere(), explained, explained.taken.physics)
     # Where a drive began is told once, or robots would be judged on other readings each.
-    held = _with_nuisances(held, motion.explained, motion.explained.taken.physics)
-    sensing = _explain_sensor(context, motion.explained, fitted, held)
+    held = _with_nuisances(held, explained, explained.taken.physics)
+    sensing = _explain_sensor(context, explained, fitted, held)
     stages = [stage for stage in (motion, sensing) if stage]
     found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
     found = found.with_terms([*known.term, *(term for stage in stages for term in stage.laws)])
     before, after = (
-        Contender(robot, _with_nuisances(held, motion.explained, robot.physics)) for robot in (known, found)
+        Contender(robot, _with_nuisances(held, explained, robot.physics)) for robot in (known, found)
     )
     context.tell("alternatives, location")
     effects, rivals = _findings(context, stages)
@@ -246,15 +246,15 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         fitted_on=tuple(r.name for r in split.fitted),
         notes=(
             *notes_on_findings(
-                split, found, candidates, unseen, invented, motion.left_out, _alike(motion.explained)
+                split, found, candidates, unseen, invented, motion.left_out, _alike(explained)
             ),
             *notes_on_recordings(
-                split, context.split, fitted, motion.explained.problem.clocks_fitted, where.doubted
+                split, context.split, fitted, explained.problem.clocks_fitted, where.doubted
             ),
             *map(note_on_astray, astray, astray.values()),
         ),
         evidence=Evidence(
-            motion.explained,
+            explained,
             sensing.explained if sensing else None,
             where,
             fitted,
@@ -334,14 +334,14 @@ class _Stage(Confirmation):
     laws, invented
         The laws, and what the verdict says of them.
     left_out
-        Encoders or poses, where nothing explains those, so that they were left out.
+        Encoders or poses, or a place on the floor [m], where nothing explains those, so that they were left out.
     """
 
     spans: Spans
     held: Residuals
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
-    left_out: str = ""
+    left_out: str | tuple[float, float] = ""
 
 
 def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: Confirmation) -> _Stage:
@@ -357,8 +357,11 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
         again = _motion(context, explained_and_confirmed(problem.filmed_as(renewed), held), held)
         motion = min(motion, again, key=_left)
     if motion.explained.unexplained and not motion.laws:
+        elsewhere = _explained_elsewhere(
+            context, motion.explained, motion.candidates, problem.residuals, held
+        )
         others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
-        motion = next(filter(None, others), motion)
+        motion = elsewhere or next(filter(None, others), motion)
     if motion.explained.steps or motion.laws:
         return motion
     return replace(motion, explained=with_spot(motion.explained))
@@ -368,6 +371,48 @@ def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
     """Explain the motion by effects that are confirmed, and add laws."""
     motion = _with_intervals(context, seen, held)
     return _with_laws(context, _with_law_of_both_motors(context, motion))
+
+
+def _explained_elsewhere(
+    context: _Context, before: Explanation, candidates: Sequence[Step], fitted: Residuals, held: Residuals
+) -> _Stage | None:
+    """Explain motion away from a place on the floor where something unknown acts; None if there is none, or that fails.
+
+    What acts there would else give effects another size in recordings that pass it. Such an effect, a candidate, may
+    hide the place while it is not part of the model.
+    """
+    problem, taken = before.problem, before.taken
+    beside = [step for step in candidates if step.effect not in taken.effects]
+    fit = problem.estimator.fit
+    models = [taken, *(fit((*taken.effects, step.effect), step.model.values) for step in beside)]
+    scores = [strongest_place(problem.under(model), model) for model in models]
+    score, spot = max(scores)
+    if score < HOTSPOT:
+        return None
+    model = models[scores.index((score, spot))]
+    place = middle(problem.under(model), model, spot)
+    context.tell(f"much is unexplained: once more away from x {place[0]:.2f} m, y {place[1]:.2f} m")
+    alone, held = (residuals.away_from(place, ABOUT_M) for residuals in (fitted, held))
+    if len(alone.index.t_s) < ENOUGH_ELSEWHERE * len(fitted.index.t_s):
+        return None
+    problem = _problem(context, context.robot, alone, held)
+    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)
+    whole = problem.sizes.of(fitted)
+    if not _is_explained(motion) or worsens(problem, problem.known, motion.explained.taken, whole):
+        return None
+    taken = motion.explained.taken
+    found = before.problem.estimator.at(taken, taken.z)
+    spot = strongest_place(before.problem.under(found), found)[1]  # beside what is known now
+    explained = replace(motion.explained, left=whole.left(taken.physics), unexplained=True, spot=spot)
+    return replace(motion, explained=explained, left_out=spot)
+
+
+def _is_explained(motion: _Stage) -> bool:
+    """Whether effects explain motion, and each has one size in all recordings: else it may be part of what is left."""
+    found = motion.explained
+    return (
+        bool(found.steps) and not found.unexplained and all(stands_out(found.problem, s) for s in found.steps)
+    )
 
 
 def _explained_without(
@@ -386,14 +431,8 @@ def _explained_without(
     problem = _problem(context, context.robot, alone, beside)
     motion = _with_intervals(context, confirmed(explain(problem, once_more=True), beside), beside)
     taken, whole = motion.explained.taken, problem.sizes.of(fitted)
-    # What is left out may be off, but a cause does not take the robot farther from it; and what has not one size in all
-    # recordings may be part of what is left.
-    if (
-        not motion.explained.steps
-        or motion.explained.unexplained
-        or not all(stands_out(motion.explained.problem, step) for step in motion.explained.steps)
-        or worsens(problem, problem.known, taken, whole)
-    ):
+    # What is left out may be off, but a cause does not take the robot farther from it.
+    if not _is_explained(motion) or worsens(problem, problem.known, taken, whole):
         return None
     both = resumed(_problem(context, context.robot, fitted, held), motion.explained)
     seen = _with_intervals(context, confirmed(both, held), held)

@@ -29,6 +29,10 @@ LEFT_OUT = {
     "poses": "The poses have an error of their own, which no effect of the catalogue explains. They were left out: "
     "what was found explains how the wheels turned. Check whether the camera was moved, and its frame.",
 }
+AT_A_PLACE = (
+    "At about x {:.2f} m, y {:.2f} m something acts that no effect of the catalogue explains. What the robot did there "
+    "was left out: what was found explains the rest. Look at the floor there, and beneath it."
+)
 
 
 def notes_on_findings(
@@ -37,7 +41,7 @@ def notes_on_findings(
     candidates: Sequence[Step] = (),
     unseen: Sequence[str] = (),
     invented: Sequence[Invented] = (),
-    left_out: str = "",
+    left_out: str | tuple[float, float] = "",
     alike: Sequence[Sequence[str]] = (),
 ) -> tuple[str, ...]:
     """Return notes on what was found, a sentence or two each.
@@ -56,7 +60,7 @@ def notes_on_findings(
     invented
         Laws found.
     left_out
-        Encoders or poses, where nothing explains those, so that they were left out.
+        Encoders or poses, or a place on the floor [m], where nothing explains those, so that they were left out.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
     """
@@ -78,7 +82,7 @@ def notes_on_findings(
     ]
     notes += [*battery_at_its_end(found), *never_apart(split, found)]
     if left_out:
-        notes.append(LEFT_OUT[left_out])
+        notes.append(LEFT_OUT[left_out] if isinstance(left_out, str) else AT_A_PLACE.format(*left_out))
     notes += [
         f"These recordings hardly tell {', '.join(together[:-1])} and {together[-1]} apart: more of one with less of "
         "another fits about as well. The intervals say how far."

@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 CELL_M = 0.1
 MOST_OF_A_BLOCK = 60.0  # one wild frame is no place
 LEAST_BLOCKS = 10
+ABOUT_M = 0.35  # about a spot: a patch, a magnet or a draught is no larger, or it is no spot
 
 
 def hotspot(problem: Problem, model: Model) -> tuple[float, float] | None:
@@ -41,18 +42,32 @@ def with_spot(explained: Explanation) -> Explanation:
 
 def strongest_place(problem: Problem, model: Model) -> tuple[float, tuple[float, float]]:
     """Return the largest excess energy in a cell of the floor, in standard deviations of noise, and where."""
+    places, excess, count = _excess(problem, model)
+    if not len(places):
+        return 0.0, (np.nan, np.nan)
+    scores = np.where(count >= LEAST_BLOCKS, excess / np.sqrt(2.0 * count), 0.0)
+    best = int(np.argmax(scores))
+    x, y = places[best]
+    return max(float(scores[best]), 0.0), (float(x), float(y))
+
+
+def middle(problem: Problem, model: Model, spot: tuple[float, float]) -> tuple[float, float]:
+    """Return the middle [m] of the excess energy about a spot."""
+    places, excess, _ = _excess(problem, model)
+    weight = np.maximum(excess, 0.0) * (np.hypot(*(places - spot).T) < ABOUT_M)
+    x, y = weight @ places / weight.sum()
+    return float(x), float(y)
+
+
+def _excess(problem: Problem, model: Model) -> tuple[Array, Array, npt.NDArray[np.intp]]:
+    """Return the cells of the floor the robot was in, their middles, shape (cells, 2) [m], and energies and blocks."""
     cells = _cells(problem, model)
     there = ~np.isnan(cells[:, 0])
-    if not there.any():
-        return 0.0, (np.nan, np.nan)
     errors = problem.residuals.errors(problem.with_small_changes(model))
     excess = np.minimum(problem.estimator.blocks.excess_by_block(errors)[there], MOST_OF_A_BLOCK)
     places, of = np.unique(cells[there], axis=0, return_inverse=True)
-    count = np.bincount(of.ravel())
-    scores = np.where(count >= LEAST_BLOCKS, np.bincount(of.ravel(), excess) / np.sqrt(2.0 * count), 0.0)
-    best = int(np.argmax(scores))
-    x, y = (places[best] + 0.5) * CELL_M
-    return max(float(scores[best]), 0.0), (float(x), float(y))
+    energy: Array = np.bincount(of.ravel(), excess).astype(float)
+    return (places + 0.5) * CELL_M, energy, np.bincount(of.ravel())
 
 
 def _cells(problem: Problem, model: Model) -> Array:

@@ -167,6 +167,15 @@ class Residuals:
         there = [run for run in self.recordings if not set(others).isdisjoint(run.recording.measured)]
         return replace(self, recordings=tuple(run.without(INSTRUMENTS[instrument]) for run in there))
 
+    def away_from(self, place: tuple[float, float], radius_m: float) -> Residuals:
+        """Return these with motion not compared near a place on the floor [m]; those without poses are left out."""
+        seen = [run for run in self.recordings if run.replayer.has_poses]
+        return replace(self, recordings=tuple(run.away_from(place, radius_m) for run in seen))
+
+    def everywhere(self) -> Residuals:
+        """Return these with motion compared everywhere again."""
+        return replace(self, recordings=tuple(replace(run, unjudged=None) for run in self.recordings))
+
     def with_clock_offsets(self, offsets_s: Array) -> Residuals:
         """Return these with other camera clocks, shape (recordings,) [s]."""
         changed = [

@@ -40,6 +40,7 @@ OFF_COURSE_M = -10.0  # there is bare floor
 # Standard deviations of a path by dead reckoning once its start is refined [m, m, rad].
 ODOMETRY_SD = PATH_CAUTION * np.array([0.00025, 0.00025, 0.001])
 FEWEST_POSES = 4  # that make a path
+RECOVERS_S = 0.3  # after which what happened at a place is over: a motor takes 0.1 s to its speed
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class RecordingResiduals:
         What its colour sensor read; None where it read none.
     nuisances
         What it has of its own.
+    unjudged
+        At which rows the motion is not compared, shape (rows,); None: it is at all of them.
     """
 
     recording: Recording
@@ -63,6 +66,7 @@ class RecordingResiduals:
     replayer: Replayer
     course: Course | None
     nuisances: Nuisances = field(default_factory=Nuisances)
+    unjudged: Mask | None = None
 
     @property
     def reads(self) -> bool:
@@ -85,6 +89,15 @@ class RecordingResiduals:
         unseen: dict[str, Any] = dict.fromkeys(columns, np.full(len(self.recording.t_s), np.nan))
         recording = replace(self.recording, **unseen)
         return residuals_of(recording, self.noise, self.replayer.inputs.memory, self.course)
+
+    def away_from(self, place: tuple[float, float], radius_m: float) -> RecordingResiduals:
+        """Return this with its motion not compared where the robot was near a place [m], nor just after."""
+        t, poses = self.replayer.t, self.replayer.inputs.pose[:, :2]
+        seen = ~np.isnan(poses).any(axis=1)
+        x, y = (np.interp(t, self.replayer.inputs.pose_t[seen], column) for column in poses[seen].T)
+        near = np.hypot(x - place[0], y - place[1]) < radius_m
+        last = np.maximum.accumulate(np.where(near, t, -np.inf))
+        return replace(self, unjudged=t - last <= RECOVERS_S)
 
     def localised(self, physics: Physics) -> RecordingResiduals:
         """Return this with the start pose its readings tell, where no camera looked; or else the bare floor it read."""
@@ -189,8 +202,10 @@ class RecordingResiduals:
         t, inputs = self.replayer.t, self.replayer.inputs
         channel = np.r_[np.repeat(np.arange(4), len(t)), np.repeat(np.arange(4, 7), len(inputs.pose_t))]
         times = np.concatenate([np.tile(t, 4), np.tile(inputs.pose_t, 3)])
-        measured = np.concatenate([self.replayer.measured.T.ravel(), inputs.pose.T.ravel()])
-        return _index(number, channel, times), ~np.isnan(measured)
+        there = ~np.isnan(np.concatenate([self.replayer.measured.T.ravel(), inputs.pose.T.ravel()]))
+        if self.unjudged is not None:
+            there &= ~self.unjudged[np.minimum(np.searchsorted(t, times), len(t) - 1)]
+        return _index(number, channel, times), there
 
     def sensor_index(self, number: int) -> tuple[ResidualIndex, Mask]:
         """Return where residuals of the colour sensor come from, and which of them there are."""

@@ -117,11 +117,12 @@ class Sizes:
         overcomes friction, nothing is known well: one such recording shall not decide. ``inflation`` is by how much the
         camera's slow noise exceeds white noise (variances), shape (3,).
         """
-        sizes = [
+        each = [
             _reading_left(run, physics, self.off) if self.sensor else _left(run, physics, inflation)
             for run in self.runs
         ]
-        return combined(sizes, _repeated if repeatedly else _typical)
+        judged = [size for size in each if size is not None]
+        return combined(judged, _repeated if repeatedly else _typical)
 
     def left_about(self, physics: Physics, spot: tuple[float, float]) -> Size:
         """Return how far a robot parts from what was measured where it passes a spot on the floor [m], typically.
@@ -162,10 +163,13 @@ def _driven(run: RecordingResiduals, physics: Physics) -> _Drive:
     return _Drive(path, wheels, float(physics["track_width"][0]))
 
 
-def _left(run: RecordingResiduals, physics: Physics, inflation: Array) -> Size:
+def _left(run: RecordingResiduals, physics: Physics, inflation: Array) -> Size | None:
+    """Return how far a robot parts from what was measured; None if no metre is judged."""
     out, track = Size(), float(physics["track_width"][0])
     rows = _replayed(run, physics).rows
     path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
+    if run.unjudged is not None:
+        return _left_elsewhere(run, physics, path, wheels, inflation)
     if run.replayer.has_poses:
         seen = measured_path(run.replayer, physics)
         out = out.or_more(_parting(path, seen, wheels, track, _path_noise(run, inflation)))
@@ -191,6 +195,20 @@ def _left_about(run: RecordingResiduals, physics: Physics, spot: tuple[float, fl
     if not inside.any():
         return None
     return Size(*_beyond(rows[:, PLACE], seen, first[inside], last[inside], _path_noise(run, WHITE)))
+
+
+def _left_elsewhere(
+    run: RecordingResiduals, physics: Physics, path: Array, wheels: Array, inflation: Array
+) -> Size | None:
+    """Return how far a robot's path parts from the poses seen, over windows of a metre that are judged throughout."""
+    assert run.unjudged is not None
+    passed = np.r_[0, np.cumsum(run.unjudged)]
+    first, last = _windows(wheels, float(physics["track_width"][0]))
+    judged = passed[last + 1] == passed[first]
+    if not judged.any():
+        return None
+    seen = measured_path(run.replayer, physics)
+    return Size(*_beyond(path, seen, first[judged], last[judged], _path_noise(run, inflation)))
 
 
 def _path_noise(run: RecordingResiduals, inflation: Array) -> _Noise:
