@@ -608,7 +608,8 @@ def _with_intervals(
     context.tell("intervals")
     while True:
         spans = intervals(explained.problem.estimator, explained.taken, context.seed)
-        weakest = weakest_absent(explained.taken, explained.steps, spans, doubtful)
+        on_bench = explained.problem.on_bench
+        weakest = weakest_absent(explained.taken, explained.steps, spans, doubtful, on_bench)
         if weakest is None:
             break
         explained, candidates = dropped(explained, weakest), (*candidates, weakest)

@@ -643,7 +643,7 @@ def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatc
 @pytest.mark.parametrize("absent", [True, False])
 def test_an_effect_that_may_as_well_be_absent_beside_a_law_is_not_named(monkeypatch, absent):
     monkeypatch.setattr(
-        beside, "weakest_absent", lambda _, steps, *__: next(iter(steps if absent else ()), None)
+        beside, "weakest_absent", lambda _, steps, *__, **___: next(iter(steps if absent else ()), None)
     )
     verdict = with_rough_bearings(8e-3)
     assert "yaw_moment" in [law.term.port for law in verdict.invented]

@@ -222,7 +222,7 @@ def without_absent(written: Written, first: Explanation, seed: int) -> Written:
     while True:
         here = written.explained
         spans = intervals(here.problem.estimator, here.taken, seed)
-        weakest = weakest_absent(here.taken, here.steps, spans)
+        weakest = weakest_absent(here.taken, here.steps, spans, on_bench=here.problem.on_bench)
         if weakest is None:
             return written
         written = _refitted(written, first, fitted_without(written, first, weakest))

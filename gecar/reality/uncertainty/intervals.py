@@ -79,9 +79,13 @@ def model_error(c: Coordinate, z: float) -> float:
 
 
 def contains_neutral(
-    model: Model, effect: str, spans: Mapping[str, Mapping[str, Interval]], doubtful: bool = False
+    model: Model,
+    effect: str,
+    spans: Mapping[str, Mapping[str, Interval]],
+    doubtful: bool = False,
+    times: float = BY_CHANCE,
 ) -> bool:
-    """Whether an effect may as well be absent: its interval holds the neutral value, or nearly, as one of many tried.
+    """Whether an effect may as well be absent: its interval holds the neutral value, or would ``times`` as long.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
     what they gain together decides. Where that is ``doubtful``, one of them at least must not be.
@@ -95,11 +99,11 @@ def contains_neutral(
     ]
     if len(sizes) > 1:
         return doubtful and all(span.low <= c.value(0.0) <= span.high for c, span in sizes)
-    return _is_near_neutral(*sizes[0])
+    return _is_near_neutral(*sizes[0], times)
 
 
-def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
-    """Whether a parameter's interval holds its neutral value, or would if it were `BY_CHANCE` times as long.
+def _is_near_neutral(c: Coordinate, span: Interval, times: float) -> bool:
+    """Whether a parameter's interval holds its neutral value, or would if it were so many times as long.
 
     A size that is known by its product with another parameter has the first alone: its interval runs along a valley,
     which may never come to neutral.
@@ -110,14 +114,22 @@ def _is_near_neutral(c: Coordinate, span: Interval) -> bool:
     if len(c.effect.parameters) > 1:
         return False
     z, end = c.at(span.value), c.at(span.low if span.value > neutral else span.high)
-    return abs(z) < BY_CHANCE * abs(z - end)
+    return abs(z) < times * abs(z - end)
 
 
 def weakest_absent(
-    model: Model, steps: Sequence[Step], spans: Mapping[str, Mapping[str, Interval]], doubtful: bool = False
+    model: Model,
+    steps: Sequence[Step],
+    spans: Mapping[str, Mapping[str, Interval]],
+    doubtful: bool = False,
+    on_bench: bool = False,
 ) -> Step | None:
-    """Return the effect that gains least of those whose intervals hold their neutral values; None if there is none."""
-    absent = [step for step in steps if contains_neutral(model, step.effect, spans, doubtful)]
+    """Return the effect that gains least of those whose intervals hold their neutral values; None if there is none.
+
+    A bench's effects are its motor's constants: none is one of many that come to something by chance.
+    """
+    times = 1.0 if on_bench else BY_CHANCE
+    absent = [step for step in steps if contains_neutral(model, step.effect, spans, doubtful, times)]
     return min(absent, key=lambda step: step.gain, default=None)
 
 
