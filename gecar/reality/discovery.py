@@ -393,7 +393,7 @@ def _explained_elsewhere(
     place = middle(problem.under(model), model, spot)
     context.tell(f"much is unexplained: once more away from x {place[0]:.2f} m, y {place[1]:.2f} m")
     alone, held = (residuals.away_from(place, ABOUT_M) for residuals in (fitted, held))
-    if len(alone.index.t_s) < ENOUGH_ELSEWHERE * len(fitted.index.t_s):
+    if not held.recordings or len(alone.index.t_s) < ENOUGH_ELSEWHERE * len(fitted.index.t_s):
         return None
     problem = _problem(context, context.robot, alone, held)
     motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.concealing import EV3, motion_of
@@ -55,6 +57,13 @@ def test_motion_is_not_compared_near_a_place_nor_just_after() -> None:
         assert after / before == pytest.approx(np.mean(run.t_s - last > 0.3), abs=0.01)
     assert away.everywhere().index.t_s.tolist() == whole.index.t_s.tolist()
     assert np.array_equal(away.everywhere().errors(EV3.physics), whole.errors(EV3.physics))
+
+
+def test_a_recording_that_tells_headings_alone_tells_no_place() -> None:
+    runs = [across(EV3, seed) for seed in range(2)]
+    gone = np.full_like(runs[1].t_s, np.nan)
+    away = motion_of([runs[0], replace(runs[1], x_m=gone, y_m=gone)]).away_from(PLACE, 0.2)
+    assert [run.recording.name for run in away.recordings] == ["run_0"]
 
 
 def test_what_a_robot_leaves_is_told_by_metres_that_are_judged_throughout() -> None:

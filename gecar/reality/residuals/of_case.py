@@ -168,8 +168,8 @@ class Residuals:
         return replace(self, recordings=tuple(run.without(INSTRUMENTS[instrument]) for run in there))
 
     def away_from(self, place: tuple[float, float], radius_m: float) -> Residuals:
-        """Return these with motion not compared near a place on the floor [m]; those without poses are left out."""
-        seen = [run for run in self.recordings if run.replayer.has_poses]
+        """Return these with motion not compared near a place [m]; recordings that tell no place are left out."""
+        seen = [run for run in self.recordings if run.tells_places]
         return replace(self, recordings=tuple(run.away_from(place, radius_m) for run in seen))
 
     def everywhere(self) -> Residuals:

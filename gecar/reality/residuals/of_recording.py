@@ -90,11 +90,20 @@ class RecordingResiduals:
         recording = replace(self.recording, **unseen)
         return residuals_of(recording, self.noise, self.replayer.inputs.memory, self.course)
 
+    @property
+    def _placed(self) -> Mask:
+        """Which of the poses tell where the robot was, shape (poses,)."""
+        return np.asarray(~np.isnan(self.replayer.inputs.pose[:, :2]).any(axis=1))
+
+    @property
+    def tells_places(self) -> bool:
+        """Whether a camera told where the robot was, and not only which way it headed."""
+        return bool(self._placed.any())
+
     def away_from(self, place: tuple[float, float], radius_m: float) -> RecordingResiduals:
         """Return this with its motion not compared where the robot was near a place [m], nor just after."""
-        t, poses = self.replayer.t, self.replayer.inputs.pose[:, :2]
-        seen = ~np.isnan(poses).any(axis=1)
-        x, y = (np.interp(t, self.replayer.inputs.pose_t[seen], column) for column in poses[seen].T)
+        t, inputs, seen = self.replayer.t, self.replayer.inputs, self._placed
+        x, y = (np.interp(t, inputs.pose_t[seen], column) for column in inputs.pose[seen, :2].T)
         near = np.hypot(x - place[0], y - place[1]) < radius_m
         last = np.maximum.accumulate(np.where(near, t, -np.inf))
         return replace(self, unjudged=t - last <= RECOVERS_S)
