@@ -90,6 +90,7 @@ def test_an_effect_is_found_beside_something_unknown_at_one_place() -> None:
     assert any("something acts that no effect of the catalogue explains" in note for note in verdict.notes)
 
 
+@pytest.mark.slow
 def test_a_place_where_something_unknown_acts_is_no_effect_of_the_rest() -> None:
     robot = EV3.with_terms([KICK])
     verdict = discover(Case("made", tuple(across(robot, seed) for seed in range(6))))
