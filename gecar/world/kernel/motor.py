@@ -114,8 +114,14 @@ def run_motors(
             right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
         left_duty, right_duty = awake(left_duty, s.t, p, c), awake(right_duty, s.t, p, c)
         if p.command_slew < math.inf:
-            left_duty, left_sudden = _ramp_left(s, left_duty, c)
-            right_duty, right_sudden = _ramp_right(s, right_duty, c)
+            s.left_began, s.left_duty, s.left_mean, acts, left_sudden = ramped(
+                s.left_began, s.left_mean, s.left_earlier_command, s.left_command, left_duty, c
+            )
+            s.left_earlier_command, s.left_command, left_duty = s.left_command, left_duty, acts
+            s.right_began, s.right_duty, s.right_mean, acts, right_sudden = ramped(
+                s.right_began, s.right_mean, s.right_earlier_command, s.right_command, right_duty, c
+            )
+            s.right_earlier_command, s.right_command, right_duty = s.right_command, right_duty, acts
     s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
     s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
     if effects:
@@ -222,26 +228,23 @@ def battery_current(s: Any, p: Any) -> float:
 
 
 @kernel
-def _ramp_left(s: Any, duty: float, c: Any) -> tuple[float, float]:
-    """Return the left motor's mean duty in a step, which follows the command only so fast, and the step's share left.
+def ramped(
+    began: float, mean: float, earlier: float, now: float, later: float, c: Any
+) -> tuple[float, float, float, float, float]:
+    """Return a ramp's duty at a step's beginning and end, its mean, the duty that acts, and the share of the step left.
 
-    That is what is left when the ramp ends. The mean holds what earlier means owe.
+    What acts is the mean, with what the mean of the step before owes.
+
+    Parameters
+    ----------
+    began, mean
+        The duty at the beginning of the step before, and the mean taken for it then.
+    earlier, now, later
+        As in `slewed`; the last is the step's own command.
     """
-    s.left_began, owes = slewed(s.left_began, s.left_earlier_command, s.left_command, duty, c)
-    s.left_duty, taken, mean = _towards(s.left_began, duty, 1.0, c)
-    owes -= s.left_mean
-    s.left_earlier_command, s.left_command, s.left_mean = s.left_command, duty, mean
-    return mean + owes, 1.0 - taken
-
-
-@kernel
-def _ramp_right(s: Any, duty: float, c: Any) -> tuple[float, float]:
-    """Do the same for the right motor."""
-    s.right_began, owes = slewed(s.right_began, s.right_earlier_command, s.right_command, duty, c)
-    s.right_duty, taken, mean = _towards(s.right_began, duty, 1.0, c)
-    owes -= s.right_mean
-    s.right_earlier_command, s.right_command, s.right_mean = s.right_command, duty, mean
-    return mean + owes, 1.0 - taken
+    began, did = slewed(began, earlier, now, later, c)
+    reached, taken, follows = _towards(began, later, 1.0, c)
+    return began, reached, follows, follows + (did - mean), 1.0 - taken
 
 
 @kernel
