@@ -180,7 +180,7 @@ def begin_as_asked(s: Any, left_duty: float, right_duty: float, p: Any, c: Any, 
     s.right_circle = max(s.right_circle + grip * asked.right_wheel_load, 0.0) * max(
         1.0 + asked.right_tyre_grip, 0.0
     )
-    s.caster_circle = max(s.caster_circle + asked.caster_friction * _caster_load(s, c) * c.dt, 0.0)
+    s.caster_circle = max(s.caster_circle + asked.caster_friction * s.caster_load * c.dt, 0.0)
     release_contacts(s)
     return sweep(s, c, True, True, True)
 
@@ -295,7 +295,7 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
     wheel to wheel.
     """
-    s.caster_load = _caster_load(s, c)
+    s.caster_load = caster_load((s.left_push + s.right_push + s.caster_push) * c.inv_dt, c)
     s.aside = s.left_side + s.right_side + s.caster_side
     left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
     s.left_bears, s.right_bears = left, right
@@ -305,12 +305,6 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     s.left_circle = s.grip * c.dt * left
     s.right_circle = s.grip * c.dt * right
     s.caster_circle = p.caster_friction * s.caster_load * c.dt
-
-
-@kernel
-def _caster_load(s: Any, c: Any) -> float:
-    """Return the load on the caster [N] by the last step's impulses."""
-    return caster_load((s.left_push + s.right_push + s.caster_push) * c.inv_dt, c)
 
 
 @kernel
