@@ -385,34 +385,43 @@ def _explained_elsewhere(
     beside = [step for step in candidates if step.effect not in taken.effects]
     fit = problem.estimator.fit
     models = [taken, *(fit((*taken.effects, step.effect), step.model.values) for step in beside)]
-    scores = [strongest_place(problem.under(model), model) for model in models]
-    score, spot = max(scores)
+    scored = [(*strongest_place(problem.under(model), model), model) for model in models]
+    score, spot, model = max(scored, key=lambda each: each[0])
     if score < HOTSPOT:
         return None
-    model = models[scores.index((score, spot))]
     place = middle(problem.under(model), model, spot)
     context.tell(f"much is unexplained: once more away from x {place[0]:.2f} m, y {place[1]:.2f} m")
     alone, held = (residuals.away_from(place, ABOUT_M) for residuals in (fitted, held))
     if not held.recordings or len(alone.index.t_s) < ENOUGH_ELSEWHERE * len(fitted.index.t_s):
         return None
-    problem = _problem(context, context.robot, alone, held)
-    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)
-    whole = problem.sizes.of(fitted)
-    if not _is_explained(motion) or worsens(problem, problem.known, motion.explained.taken, whole):
+    motion = _explained_in_part(context, alone, held, fitted)
+    if motion is None:
         return None
     taken = motion.explained.taken
-    found = before.problem.estimator.at(taken, taken.z)
-    spot = strongest_place(before.problem.under(found), found)[1]  # beside what is known now
-    explained = replace(motion.explained, left=whole.left(taken.physics), unexplained=True, spot=spot)
-    return replace(motion, explained=explained, left_out=spot)
+    found = problem.estimator.at(taken, taken.z)
+    spot = strongest_place(problem.under(found), found)[1]  # beside what is known now
+    return replace(motion, explained=replace(motion.explained, spot=spot), left_out=spot)
 
 
-def _is_explained(motion: _Stage) -> bool:
-    """Whether effects explain motion, and each has one size in all recordings: else it may be part of what is left."""
-    found = motion.explained
-    return (
-        bool(found.steps) and not found.unexplained and all(stands_out(found.problem, s) for s in found.steps)
-    )
+def _explained_in_part(
+    context: _Context, part: Residuals, held: Residuals, fitted: Residuals
+) -> _Stage | None:
+    """Explain a part of what was measured, the rest of which stays unexplained; None if effects do not explain it all.
+
+    Each must have one size in all recordings, or it may be part of the rest. That may be off, but a cause does not take
+    the robot farther from it.
+    """
+    problem = _problem(context, context.robot, part, held)
+    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)
+    found, whole = motion.explained, problem.sizes.of(fitted)
+    if (
+        not found.steps
+        or found.unexplained
+        or not all(stands_out(found.problem, step) for step in found.steps)
+        or worsens(problem, problem.known, found.taken, whole)
+    ):
+        return None
+    return replace(motion, explained=replace(found, left=whole.left(found.taken.physics), unexplained=True))
 
 
 def _explained_without(
@@ -428,18 +437,14 @@ def _explained_without(
     if measured.isdisjoint(INSTRUMENTS[instrument]) or not alone.recordings:
         return None
     context.tell(f"much is unexplained: once more without the {instrument}")
-    problem = _problem(context, context.robot, alone, beside)
-    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), beside), beside)
-    taken, whole = motion.explained.taken, problem.sizes.of(fitted)
-    # What is left out may be off, but a cause does not take the robot farther from it.
-    if not _is_explained(motion) or worsens(problem, problem.known, taken, whole):
+    motion = _explained_in_part(context, alone, beside, fitted)
+    if motion is None:
         return None
     both = resumed(_problem(context, context.robot, fitted, held), motion.explained)
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
-    explained = replace(motion.explained, left=whole.left(taken.physics), unexplained=True)
-    return replace(motion, explained=explained, left_out=instrument)
+    return replace(motion, left_out=instrument)
 
 
 def _problem(context: _Context, robot: Robot, fitted: Residuals, held: Residuals) -> Problem:
