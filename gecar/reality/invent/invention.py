@@ -259,7 +259,7 @@ def _leaves_more(after: Explanation, before: Explanation) -> bool:
 
 
 def _is_known(library: Library, law: Law) -> bool:
-    """Whether what a law says is known: where a sensor is, which point a force comes from, and if a frame turns."""
+    """Whether it is known what a law says of a place: the sensor's, that of what pulls, or that a frame turns about."""
     return _beyond_path(library, law) and _from_a_point(library, law) and _turns(library, law)
 
 
