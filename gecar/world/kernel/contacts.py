@@ -221,8 +221,8 @@ def separation(slip: float, push: float, play: float, gap: float, radius: float,
     """
     if gap == 0.0:
         return slip
-    low = -(gap + play) * radius / c.dt
-    high = (gap - play) * radius / c.dt
+    low = -(gap + play) * radius * c.inv_dt
+    high = (gap - play) * radius * c.inv_dt
     if push > 0.0:
         return slip - high
     if push < 0.0:
