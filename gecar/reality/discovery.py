@@ -348,7 +348,7 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     """Explain how the robot moved: by the effects that were seen, by effects and laws, or by laws alone.
 
     Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
-    anew. If none of these does, one instrument may be wrong, or what is left may be at one place on the floor.
+    anew. What is left may be at one place on the floor, or else one instrument may be wrong.
     """
     motion = _motion(context, seen, held)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
@@ -356,15 +356,16 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
         context.tell("once more with the camera's clocks as they are beside laws")
         again = _motion(context, explained_and_confirmed(problem.filmed_as(renewed), held), held)
         motion = min(motion, again, key=_left)
-    if motion.explained.unexplained and not motion.laws:
-        elsewhere = _explained_elsewhere(
-            context, motion.explained, motion.candidates, problem.residuals, held
-        )
-        others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
-        motion = elsewhere or next(filter(None, others), motion)
-    if motion.explained.steps or motion.laws:
+    if motion.laws:
         return motion
-    return replace(motion, explained=with_spot(motion.explained))
+    whole, motion = motion, replace(motion, explained=with_spot(motion.explained))
+    if not motion.explained.unexplained:
+        return motion
+    elsewhere = _explained_elsewhere(context, motion.explained, motion.candidates, problem.residuals, held)
+    if elsewhere or not whole.explained.unexplained:
+        return elsewhere or motion
+    others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
+    return next(filter(None, others), motion)
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.concealing import EV3, motion_of
 
+from gecar.reality import discovery
 from gecar.reality.discovery import discover
 from gecar.reality.recordings.recording import Case, Recording, make_recording
 from gecar.reality.recordings.setup import Setup
@@ -79,7 +80,19 @@ def test_what_a_robot_leaves_is_told_by_metres_that_are_judged_throughout() -> N
     assert (nowhere.mm_1m, nowhere.deg_1m) == (0.0, 0.0)
 
 
-def test_an_effect_is_found_beside_something_unknown_at_one_place() -> None:
+@pytest.mark.parametrize("much", [True, False])
+def test_an_effect_is_found_beside_something_unknown_at_one_place(
+    monkeypatch: pytest.MonkeyPatch, much: bool
+) -> None:
+    """Also if that does not leave much of whole drives, as beside an effect that does far more, but shows there."""
+    motion = discovery._motion
+
+    def leaving(*given: object) -> object:
+        stage = motion(*given)
+        return replace(stage, explained=replace(stage.explained, unexplained=much))
+
+    monkeypatch.setattr(discovery, "_motion", leaving)
+    monkeypatch.setattr(discovery, "with_spot", lambda explained: replace(explained, unexplained=True))
     robot = EV3.with_effects(WHEELS).with_terms([KICK])
     verdict = discover(Case("made", tuple(across(robot, seed) for seed in range(6))))
     assert verdict.verdict == "missing_and_unexplained"
