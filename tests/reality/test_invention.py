@@ -539,6 +539,15 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, be
     assert written.terms[0].constants["c1"] == pytest.approx(-0.01, rel=0.05)
 
 
+def test_what_does_far_less_than_a_law_is_not_added_to_it(monkeypatch):
+    """What else is named beside the law (above) is not where far less begins with a thousand times what that does."""
+    monkeypatch.setattr(beside, "MENDS", 1e3)
+    robot = robot_with(dict(SCRUB)).with_effects({"battery_resistance": {"resistance_ohm": 0.3}})
+    written = invention.invent(*with_nothing_named(robot, "battery_resistance"), FEW)
+    assert [term.port for term in written.terms] == ["yaw_moment"]
+    assert written.explained.steps == ()
+
+
 def test_a_cause_that_became_a_part_of_a_law_is_named_in_its_place():
     robot = robot_with(dict(DRAG)).with_effects({"viscous_friction": {"coefficient_nms": 4e-3}})
     written = invention.invent(*with_nothing_named(robot, "viscous_friction"), FEW)
