@@ -358,14 +358,14 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
         motion = min(motion, again, key=_left)
     if motion.laws:
         return motion
-    whole, motion = motion, replace(motion, explained=with_spot(motion.explained))
-    if not motion.explained.unexplained:
-        return motion
-    elsewhere = _explained_elsewhere(context, motion.explained, motion.candidates, problem.residuals, held)
-    if elsewhere or not whole.explained.unexplained:
-        return elsewhere or motion
+    found = replace(motion, explained=with_spot(motion.explained))
+    if not found.explained.unexplained:
+        return found
+    elsewhere = _explained_elsewhere(context, found.explained, found.candidates, problem.residuals, held)
+    if elsewhere or not motion.explained.unexplained:
+        return elsewhere or found
     others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
-    return next(filter(None, others), motion)
+    return next(filter(None, others), found)
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
@@ -391,7 +391,7 @@ def _explained_elsewhere(
     if score < HOTSPOT:
         return None
     place = middle(problem.under(model), model, spot)
-    context.tell(f"much is unexplained: once more away from x {place[0]:.2f} m, y {place[1]:.2f} m")
+    context.tell(f"something acts at one place: once more away from x {place[0]:.2f} m, y {place[1]:.2f} m")
     alone, held = (residuals.away_from(place, ABOUT_M) for residuals in (fitted, held))
     if not held.recordings or len(alone.index.t_s) < ENOUGH_ELSEWHERE * len(fitted.index.t_s):
         return None
@@ -407,10 +407,10 @@ def _explained_elsewhere(
 def _explained_in_part(
     context: _Context, part: Residuals, held: Residuals, fitted: Residuals
 ) -> _Stage | None:
-    """Explain a part of what was measured, the rest of which stays unexplained; None if effects do not explain it all.
+    """Explain a part of what was measured, and leave the rest unexplained; None if effects leave much of the part.
 
-    Each must have one size in all recordings, or it may be part of the rest. That may be off, but a cause does not take
-    the robot farther from it.
+    Each effect must have one size in all recordings, or it may belong to the rest. It need not explain the rest, but a
+    cause does not make it worse.
     """
     problem = _problem(context, context.robot, part, held)
     motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)

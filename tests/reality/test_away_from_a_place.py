@@ -84,7 +84,7 @@ def test_what_a_robot_leaves_is_told_by_metres_that_are_judged_throughout() -> N
 def test_an_effect_is_found_beside_something_unknown_at_one_place(
     monkeypatch: pytest.MonkeyPatch, much: bool
 ) -> None:
-    """Also if that does not leave much of whole drives, as beside an effect that does far more, but shows there."""
+    """Also where it leaves little of whole drives, as beside an effect that does far more, and shows at the place."""
     motion = discovery._motion
 
     def leaving(*given: object) -> object:

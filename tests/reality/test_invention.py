@@ -540,7 +540,7 @@ def test_an_effect_beside_unlisted_physics_is_found_with_the_law(monkeypatch, be
 
 
 def test_what_does_far_less_than_a_law_is_not_added_to_it(monkeypatch):
-    """What else is named beside the law (above) is not where far less begins with a thousand times what that does."""
+    """The test above names the resistance; it is refused where it has to do a thousand times as much as the law."""
     monkeypatch.setattr(beside, "MENDS", 1e3)
     robot = robot_with(dict(SCRUB)).with_effects({"battery_resistance": {"resistance_ohm": 0.3}})
     written = invention.invent(*with_nothing_named(robot, "battery_resistance"), FEW)

@@ -36,7 +36,7 @@ Array = npt.NDArray[np.float64]
 
 AS_MUCH = 0.5  # of what a part of a law does: what an effect's derivative must do, to be tried in its place
 SAME = 0.98  # the same, of an effect that a law is
-# Share of what laws do below which an effect beside them may mend their form: a wrong one did 0.06, a right one 0.10.
+# Share of what laws do below which an effect may only correct their form: a wrong one did 0.06, a right one 0.10.
 MENDS = 0.07
 
 
@@ -165,18 +165,17 @@ def _with_one_more(
     tried = (*here.tried, stage)
     for step in proved_steps(problem, stage):
         more = _with_step(written, first, step, tried)
-        explained = None if _may_mend(more, step.effect) else held_up(more.explained, held)
+        explained = None if _may_mend(more, first, step.effect) else held_up(more.explained, held)
         if explained:
             return replace(more, explained=explained)
     return None
 
 
-def _may_mend(written: Written, effect: str) -> bool:
-    """Whether an effect that was added beside laws does so much less than they do that it may mend their form."""
+def _may_mend(written: Written, first: Explanation, effect: str) -> bool:
+    """Whether an effect added beside laws does so little, compared with them, that it may only correct their form."""
     here = written.explained
     problem, model = here.problem, here.taken
-    robot = problem.estimator.robot
-    bare = robot.with_terms(robot.term[: -len(written.terms) or None]).with_effects(model.values)
+    bare = first.problem.estimator.robot.with_effects(model.values)
     (step,) = (each for each in here.steps if each.effect == effect)
     alone, laws = size_of(problem, model, step), problem.sizes.apart(model.physics, bare.physics)
     return problem.material.times(alone) < MENDS * problem.material.times(laws)

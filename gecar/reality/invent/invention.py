@@ -259,7 +259,7 @@ def _leaves_more(after: Explanation, before: Explanation) -> bool:
 
 
 def _is_known(library: Library, law: Law) -> bool:
-    """Whether it is known what a law says of a place: the sensor's, that of what pulls, or that a frame turns about."""
+    """Whether the places a law speaks of are known: the sensor's, the point that pulls, or that a frame turns about."""
     return _beyond_path(library, law) and _from_a_point(library, law) and _turns(library, law)
 
 

@@ -60,7 +60,7 @@ def middle(problem: Problem, model: Model, spot: tuple[float, float]) -> tuple[f
 
 
 def _excess(problem: Problem, model: Model) -> tuple[Array, Array, npt.NDArray[np.intp]]:
-    """Return the middles of the cells the robot was in, shape (cells, 2) [m], and their excess energies and blocks."""
+    """Return each cell the robot was in: its middle, shape (cells, 2) [m], excess energy, and number of blocks."""
     cells = _cells(problem, model)
     there = ~np.isnan(cells[:, 0])
     errors = problem.residuals.errors(problem.with_small_changes(model))

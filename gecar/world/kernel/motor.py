@@ -231,7 +231,7 @@ def battery_current(s: Any, p: Any) -> float:
 def ramped(
     began: float, mean: float, earlier: float, now: float, later: float, c: Any
 ) -> tuple[float, float, float, float, float]:
-    """Return a ramp's duty at a step's beginning and end, its mean, the duty that acts, and the share of the step left.
+    """Return a ramp's duty at a step's beginning and end, its mean, the duty that acts, and the share after its end.
 
     What acts is the mean, with what the mean of the step before owes.
 
