@@ -16,7 +16,14 @@ import numpy.typing as npt
 from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
-from gecar.reality.advise.notes import note_on_astray, notes_on_findings, notes_on_recordings
+from gecar.reality.advise.notes import (
+    WITHOUT,
+    note_on_astray,
+    note_on_moments,
+    note_on_place,
+    notes_on_findings,
+    notes_on_recordings,
+)
 from gecar.reality.evidence import Evidence
 from gecar.reality.fitting.gain_offset import with_gain_from_even_floor
 from gecar.reality.fitting.model import Model, Step
@@ -27,6 +34,7 @@ from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import ABOUT_M, middle, strongest_place, with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
+from gecar.reality.locate.moments import moments
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
@@ -334,21 +342,22 @@ class _Stage(Confirmation):
     laws, invented
         The laws, and what the verdict says of them.
     left_out
-        Encoders or poses, or a place on the floor [m], where nothing explains those, so that they were left out.
+        What is said of an instrument, a place or moments that nothing explains, so that they were left out.
     """
 
     spans: Spans
     held: Residuals
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
-    left_out: str | tuple[float, float] = ""
+    left_out: str = ""
 
 
 def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: Confirmation) -> _Stage:
     """Explain how the robot moved: by the effects that were seen, by effects and laws, or by laws alone.
 
     Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
-    anew. What is left may be at one place on the floor, or else one instrument may be wrong.
+    anew. What is left may be at one place on the floor, or else one instrument may be wrong, or something acts now and
+    then.
     """
     motion = _motion(context, seen, held)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
@@ -365,7 +374,8 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     if elsewhere or not motion.explained.unexplained:
         return elsewhere or found
     others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
-    return next(filter(None, others), found)
+    without = next(filter(None, others), None)
+    return without or _explained_at_other_moments(context, found.explained, problem.residuals, held) or found
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
@@ -401,7 +411,24 @@ def _explained_elsewhere(
     taken = motion.explained.taken
     found = problem.estimator.at(taken, taken.z)
     spot = strongest_place(problem.under(found), found)[1]  # beside what is known now
-    return replace(motion, explained=replace(motion.explained, spot=spot), left_out=spot)
+    return replace(motion, explained=replace(motion.explained, spot=spot), left_out=note_on_place(spot))
+
+
+def _explained_at_other_moments(
+    context: _Context, before: Explanation, fitted: Residuals, held: Residuals
+) -> _Stage | None:
+    """Explain motion without the moments at which something unknown acts; None if few, or many, or that fails."""
+    problem, taken = before.problem, before.taken
+    if problem.on_bench:
+        return None
+    acting, aside = moments(problem, taken, problem.with_its_camera(held, taken.physics))
+    alone, beside = fitted.except_at(acting), held.except_at(aside)
+    share = len(alone.index.t_s) / max(len(fitted.index.t_s), 1)
+    if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
+        return None
+    context.tell("something acts at some moments: once more without those")
+    motion = _explained_in_part(context, alone, beside, fitted)
+    return motion and replace(motion, left_out=note_on_moments(alone))
 
 
 def _explained_in_part(
@@ -413,7 +440,10 @@ def _explained_in_part(
     cause does not make it worse.
     """
     problem = _problem(context, context.robot, part, held)
-    motion = _with_intervals(context, confirmed(explain(problem, once_more=True), held), held)
+    explained = explain(problem, once_more=True)
+    if explained.unexplained or not explained.steps:
+        return None
+    motion = _with_intervals(context, confirmed(explained, held, in_part=True), held)
     found, whole = motion.explained, problem.sizes.of(fitted)
     if (
         not found.steps
@@ -445,7 +475,7 @@ def _explained_without(
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
-    return replace(motion, left_out=instrument)
+    return replace(motion, left_out=WITHOUT[instrument])
 
 
 def _problem(context: _Context, robot: Robot, fitted: Residuals, held: Residuals) -> Problem:

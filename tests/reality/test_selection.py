@@ -493,6 +493,18 @@ def test_a_gain_on_recordings_set_aside_is_judged_beside_its_own_spread(
     assert bool(proof.explained.steps) == kept
 
 
+@pytest.mark.parametrize(("shares", "in_part"), [([0.1, 0.3, 0.5, 0.7], False), ([0.4, 0.5, 0.7, 0.8], True)])
+def test_parts_of_recordings_set_aside_must_likely_be_predicted_better_with_an_effect(
+    monkeypatch: pytest.MonkeyPatch, shares: list[float], in_part: bool
+) -> None:
+    """As whole drives, in which something unknown acts, confirm nothing."""
+    monkeypatch.setattr(confirmation, "_helps", lambda *_: True)
+    explained = explain(linear_problem(linear({VISCOUS: 3.0}, RESPONSES)))
+    held = set_aside(shares)
+    assert confirmed(explained, held).explained.steps  # type: ignore[arg-type]
+    assert bool(confirmed(explained, held, in_part=True).explained.steps) == in_part  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("share", "nearer", "helps"),
     [

@@ -14,7 +14,7 @@ from gecar.reality.invent.sentences import linear, physics_grammar, single_laws
 from gecar.reality.recordings.recording import Recording, make_recording
 from gecar.reality.recordings.setup import Setup
 from gecar.reality.replay.kernel import _between
-from gecar.reality.replay.replayer import replay, replayer_of
+from gecar.reality.replay.replayer import Replayer, replay, replayer_of
 from gecar.world.effects import CATALOGUE
 from gecar.world.ports import BY_PORT, CONSTANTS
 from gecar.world.robot import load_robot
@@ -109,6 +109,42 @@ def test_a_re_based_replay_stays_near_a_robot_with_larger_wheels() -> None:
     far = np.abs(replay(recording, EV3, align=False).x_m - recording.x_m).max()
     near = np.abs(replay(recording, EV3, memory_s=0.2).x_m - recording.x_m).max()
     assert near < 0.2 * far
+
+
+def jumping(after_s: float = 2.0) -> tuple[Recording, np.ndarray]:
+    """Return a drive that a hand moves by 5 cm and each wheel by half a radian, and which rows are up to then."""
+    run = driven(waves, steps)
+    late = run.t_s >= after_s
+    moved = {name: getattr(run, name) + 0.5 * late for name in ("left_angle_rad", "right_angle_rad")}
+    return replace(run, x_m=run.x_m + 0.05 * late, **moved), ~late
+
+
+def largest_errors(replayer: Replayer, late: np.ndarray) -> tuple[float, float]:
+    """Return the largest residuals of encoders and of poses at some rows."""
+    errors = replayer.errors(EV3.physics)[0]
+    angles, poses = errors[: 2 * len(late)].reshape(2, -1), errors[4 * len(late) :].reshape(3, -1)
+    return np.abs(angles[:, late]).max(), np.abs(poses[:, late]).max()
+
+
+def test_what_happened_before_a_replay_begins_anew_does_not_last() -> None:
+    run, early = jumping()
+    replayer, afterwards = replayer_of(run, memory_s=1.0), np.roll(~early, 1) & ~early
+    assert min(largest_errors(replayer, afterwards)) > 3.0
+    anew = replayer.anew_at(early | ~afterwards)
+    assert max(largest_errors(anew, afterwards)) < 0.01
+    again = anew.anew_at(np.zeros(len(early), bool))
+    np.testing.assert_array_equal(again.errors(EV3.physics), replayer.errors(EV3.physics))
+    whole = replayer.open_loop()
+    np.testing.assert_array_equal(whole.anew_at(early).errors(EV3.physics), whole.errors(EV3.physics))
+
+
+def test_a_replay_with_a_shorter_memory_forgets_sooner() -> None:
+    run, _ = jumping()
+    late = run.t_s > 2.5
+    replayer = replayer_of(run, memory_s=1.0)
+    before, after = (largest_errors(each, late) for each in (replayer, replayer.with_memory(0.1)))
+    assert after[0] < 0.02 * before[0]
+    assert after[1] < 0.1 * before[1]
 
 
 def test_a_wheel_in_the_air_reaches_the_motors_free_speed() -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from gecar.reality.fitting.model import Step
 from gecar.reality.materiality import Size
@@ -23,16 +24,14 @@ APART_S = 1.0  # of one motor driven alone: 1.2 s and more told such motors that
 NOT_CONFIRMED = "the held-out ones do not confirm it, or its interval contains its neutral value"
 OR_PATH = ", or the measured path is what is wrong"
 DRIFTS = "its size differs between recordings, times, headings or kinds of motion: it imitates something else"
-LEFT_OUT = {
+WITHOUT = {
     "encoders": "The encoders have an error of their own, which no effect of the catalogue explains. They were left "
     "out: what was found explains the path. Compare the clock, the scale and the resets of the wheels' angles.",
     "poses": "The poses have an error of their own, which no effect of the catalogue explains. They were left out: "
     "what was found explains how the wheels turned. Check whether the camera was moved, and its frame.",
 }
-AT_A_PLACE = (
-    "At about x {:.2f} m, y {:.2f} m something acts that no effect of the catalogue explains. What the robot did there "
-    "was left out: what was found explains the rest. Look at the floor there, and beneath it."
-)
+"""What is said where an instrument was left out."""
+MOST_MOMENTS = 4  # that are given
 
 
 def notes_on_findings(
@@ -41,7 +40,7 @@ def notes_on_findings(
     candidates: Sequence[Step] = (),
     unseen: Sequence[str] = (),
     invented: Sequence[Invented] = (),
-    left_out: str | tuple[float, float] = "",
+    left_out: str = "",
     alike: Sequence[Sequence[str]] = (),
 ) -> tuple[str, ...]:
     """Return notes on what was found, a sentence or two each.
@@ -60,7 +59,7 @@ def notes_on_findings(
     invented
         Laws found.
     left_out
-        Encoders or poses, or a place on the floor [m], where nothing explains those, so that they were left out.
+        What is said of an instrument, a place or moments that were left out.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
     """
@@ -81,8 +80,7 @@ def notes_on_findings(
         if split.held and not law.shows
     ]
     notes += [*battery_at_its_end(found), *never_apart(split, found)]
-    if left_out:
-        notes.append(LEFT_OUT[left_out] if isinstance(left_out, str) else AT_A_PLACE.format(*left_out))
+    notes += [left_out] if left_out else []
     notes += [
         f"These recordings hardly tell {', '.join(together[:-1])} and {together[-1]} apart: more of one with less of "
         "another fits about as well. The intervals say how far."
@@ -139,6 +137,37 @@ def notes_on_recordings(
             f"Start poses found from sensor readings, up to places that look the same: {'; '.join(located)}."
         )
     return tuple(notes)
+
+
+def note_on_place(place: tuple[float, float]) -> str:
+    """Return a note on a place on the floor [m] that was left out."""
+    x, y = place
+    return (
+        f"At about x {x:.2f} m, y {y:.2f} m something acts that no effect of the catalogue explains. What the robot did"
+        " there was left out: what was found explains the rest. Look at the floor there, and beneath it."
+    )
+
+
+def note_on_moments(residuals: Residuals) -> str:
+    """Return a note on the moments at which the motion of recordings is not compared."""
+    spans = [
+        (t[last] - t[first], f"{run.recording.name} at {t[first]:.1f}-{t[last]:.1f} s")
+        for run in residuals.recordings
+        for t, first, last in _not_compared(run)
+    ]
+    longest = sorted(spans, reverse=True)[:MOST_MOMENTS]
+    return (
+        "At some moments something acts that no effect of the catalogue explains. They were left out, of those fitted"
+        f" on mainly {', '.join(where for _, where in longest)}: what was found explains the others. Look at what"
+        " happened then, and whether all commands arrived."
+    )
+
+
+def _not_compared(run: RecordingResiduals) -> list[tuple[npt.NDArray[np.float64], int, int]]:
+    """Return the times of a recording's rows [s], and the first and last row of each span that is not compared."""
+    rows = run.unjudged if run.unjudged is not None else np.zeros(len(run.replayer.t), bool)
+    begins, ends = (np.flatnonzero(np.diff(np.r_[0, rows, 0]) == step) for step in (1, -1))
+    return [(run.replayer.t, int(first), int(end) - 1) for first, end in zip(begins, ends, strict=True)]
 
 
 def note_on_astray(name: str, size: Size) -> str:

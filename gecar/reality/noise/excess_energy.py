@@ -35,6 +35,8 @@ class Blocks:
         Samples in each, shape (count,).
     recording, t_s
         Where each lies, and its middle [s], shape (count,).
+    moments
+        Moments, shape (n,): a block's time, in all channels.
     """
 
     def __init__(self, index: ResidualIndex) -> None:
@@ -51,6 +53,8 @@ class Blocks:
         self.recording[self._of] = index.recording
         self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
         self._later = self._blocks_later(round(LASTING_S / BLOCK_S))
+        at = index.recording.astype(np.int64) * 10_000_000 + (index.t_s / BLOCK_S).astype(np.int64)
+        self.moments = np.unique(at, return_inverse=True)[1]
 
     def excess_energy(self, errors: Array, inflation: Array | None = None) -> float:
         """Return the energy of block means above what noise would leave.
@@ -73,9 +77,34 @@ class Blocks:
         energy = self.sums(np.clip(errors, -CLIP, CLIP)) ** 2 / self.samples
         typical = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
-            typical[channel] = max(self._typical(energy, channel), 1.0)
+            typical[channel] = max(_typical(energy[self._channel == channel]), 1.0)
         out: Array = np.where(np.isin(self._channel, ENCODERS), 0.0, energy / typical[self._channel] - 1.0)
         return out
+
+    def energy_by_moment(self, errors: Array, judged: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return each moment's energy over that of the typical (median) judged one, and what is typical.
+
+        Parameters
+        ----------
+        errors
+            Residuals in units of the sensors' noise, shape (n,).
+        judged
+            Which of them are judged, shape (n,).
+
+        Returns
+        -------
+        tuple
+            Energy, shape (moments,), the mean over channels; and the standard deviation that each residual typically
+            has, shape (n,), no less than its sensor's noise.
+        """
+        energy = self.sums(errors) ** 2 / self.samples
+        counted, typical = self.sums(judged.astype(float)) > 0.0, np.ones(len(CHANNELS))
+        for channel in np.unique(self._channel[counted]):
+            typical[channel] = max(_typical(energy[counted & (self._channel == channel)]), 1.0)
+        of = np.zeros(self.count, np.int64)
+        of[self._of] = self.moments
+        sums = np.bincount(of, energy / typical[self._channel])
+        return sums / np.bincount(of), np.sqrt(typical[self._channel])[self._of]
 
     def excess_energy_of_sums(self, sums: Array) -> float:
         """Return the excess energy of residuals of which only each block's sum is known, shape (blocks,)."""
@@ -120,16 +149,12 @@ class Blocks:
         out = np.ones(len(CHANNELS))
         for channel in np.unique(self._channel):
             if channel not in WHITE:
-                typical = self._typical(energy, channel)
+                typical = _typical(energy[self._channel == channel])
                 change = changes[self._channel[first] == channel]
                 if len(change):
                     typical = min(typical, float(np.median(change)) / CHI_SQUARE_MEDIAN)
                 out[channel] = np.clip(typical, 1.0, LARGEST_INFLATION)
         return out
-
-    def _typical(self, energy: Array, channel: int) -> float:
-        """Return the energy of a channel's typical (median) block, in variances of its mean, were it noise."""
-        return float(np.median(energy[self._channel == channel])) / CHI_SQUARE_MEDIAN
 
     def _blocks_later(self, lag: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return pairs of blocks of one recording and channel that lie so many blocks apart."""
@@ -138,6 +163,11 @@ class Blocks:
         )
         _, first, later = np.intersect1d(place + lag, place, return_indices=True)
         return first, later
+
+
+def _typical(energy: Array) -> float:
+    """Return the energy of the typical (median) block, in variances of its mean, were it noise."""
+    return float(np.median(energy)) / CHI_SQUARE_MEDIAN
 
 
 def _first(of: npt.NDArray[np.int64], values: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:

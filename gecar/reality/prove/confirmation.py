@@ -18,6 +18,7 @@ from gecar.reality.selection.acceptance import most_uneven, stands_out, worsens
 from gecar.reality.selection.cross_validation import refitted_errors
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import (
+    AS_GOOD_WITHOUT,
     LEAST_SHOWN,
     UNSEEN,
     Share,
@@ -68,7 +69,7 @@ def explained_and_confirmed(problem: Problem, held: Residuals) -> Confirmation:
     return replace(again, candidates=(*first.candidates, *again.candidates))
 
 
-def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
+def confirmed(explained: Explanation, held: Residuals, in_part: bool = False) -> Confirmation:
     """Drop, one by one, the effects the recordings set aside do not ask for, and refit the others.
 
     They must ask for a share of the effect that is surely more than none, and not surely so small that the effect, as
@@ -82,6 +83,9 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
         Of the recordings fitted on.
     held
         Residuals of the same kind, of the recordings set aside.
+    in_part
+        Whether they are parts of what was measured, away from something unknown. This acts in whole drives, which then
+        confirm nothing: the parts must more likely than not be predicted better with an effect than without.
     """
     candidates, unseen = list(explained.drifting), set[str]()
     while explained.steps and held.recordings:
@@ -94,7 +98,8 @@ def confirmed(explained: Explanation, held: Residuals) -> Confirmation:
             for s, share in judged
         ]
         explained = replace(explained, steps=tuple(step for step, _ in judged))
-        failing = [(s, share) for s, share in judged if share.margin <= 0.0]
+        least = AS_GOOD_WITHOUT if in_part else -np.inf
+        failing = [(s, share) for s, share in judged if share.margin <= 0.0 or share.value <= least]
         if failing:
             worst, _ = min(failing, key=lambda pair: pair[1].margin)
         else:

@@ -24,6 +24,7 @@ from gecar.reality.replay.kernel_input import Kept, KernelInput
 from gecar.reality.replay.pose_filter import (
     FILTER,
     POSE,
+    UNKNOWN,
     begin_filter,
     correct,
     grow,
@@ -211,6 +212,8 @@ def _weigh(i: int, inputs: KernelInput, weights: Array) -> None:
 
     A young mean weighs all it has seen alike; an old one forgets.
     """
+    if inputs.anew[i]:
+        weights[0] = weights[1] = 0.0
     for k in range(2):
         if not math.isnan(inputs.measured[i, k]):
             keep = math.exp(-(inputs.t[i] - weights[2 + k]) / inputs.memory)
@@ -227,6 +230,8 @@ def _compare_pose(
     place_sd, turn_sd = inputs.sd[3], inputs.sd[4]
     place = inputs.walk[0] * inputs.walk[0] * elapsed
     turn = inputs.walk[1] * inputs.walk[1] * elapsed
+    if inputs.pose_anew[j]:
+        place = turn = UNKNOWN
     endless = math.isinf(inputs.memory)
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 class KernelInput(NamedTuple):
@@ -29,6 +30,8 @@ class KernelInput(NamedTuple):
         Process noise of the pose, a random walk: position [m/sqrt(s)], heading [rad/sqrt(s)], shape (2,).
     memory
         Over which wheel angles are re-based [s]; inf: never, and neither is the pose.
+    anew, pose_anew
+        At which rows and poses all that was measured before is forgotten, shapes (rows,) and (poses,).
     bench
         Whether the wheels are in the air.
     """
@@ -42,6 +45,8 @@ class KernelInput(NamedTuple):
     sd: Array
     walk: Array
     memory: float
+    anew: Mask
+    pose_anew: Mask
     bench: bool
 
 

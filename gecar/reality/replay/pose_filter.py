@@ -21,7 +21,7 @@ _POSE = "x_error y_error heading_error x y heading x_off y_off heading_off"
 POSE = np.dtype([(field, np.float64) for field in _POSE.split()])
 """Normalised residuals of a pose, the pose predicted, and what terms add to it."""
 
-_UNKNOWN = 0.01  # the start pose is known to 0.1 m and 6 degrees: to nothing, beside what follows
+UNKNOWN = 0.01  # a pose known to 0.1 m and 6 degrees: to nothing, beside what follows
 
 
 @kernel
@@ -29,7 +29,7 @@ def begin_filter(f: Any, x: float, y: float) -> None:
     """Begin at a start place [m]."""
     f.before_x, f.before_y = x, y
     f.xy = f.xh = f.yx = f.yh = f.hx = f.hy = 0.0
-    f.xx = f.yy = f.hh = _UNKNOWN
+    f.xx = f.yy = f.hh = UNKNOWN
 
 
 @kernel

@@ -151,6 +151,20 @@ class Replayer:
         """Return this to be replayed whole, never re-based on what was measured."""
         return replace(self, inputs=self.inputs._replace(memory=np.inf))
 
+    def with_memory(self, memory_s: float) -> Replayer:
+        """Return this to be drawn back to the measurement over another time [s].
+
+        A steady filter on a random walk forgets in inverse proportion to the walk.
+        """
+        walk = self.inputs.walk * (self.inputs.memory / memory_s)
+        return replace(self, inputs=self.inputs._replace(memory=memory_s, walk=walk))
+
+    def anew_at(self, rows: npt.NDArray[np.bool_]) -> Replayer:
+        """Return this to forget at some rows, shape (rows,), and at their poses, what was measured before."""
+        anew = np.r_[np.zeros(self.first_row, bool), rows]
+        row = np.minimum(np.searchsorted(self.inputs.t, self.inputs.pose_t), len(anew) - 1)
+        return replace(self, inputs=self.inputs._replace(anew=anew, pose_anew=anew[row]))
+
     def play(self, physics: npt.NDArray[Any], start: Array | None = None) -> Prediction:
         """Replay under a physics record of shape (1,), from the recorded start or another [m, m, rad]."""
         chosen = self.start if start is None else start
@@ -240,7 +254,7 @@ def replayer_of(
     command_t, commands = command_t[order], np.vstack([commands, recording.lost_commands])[order]
     inputs = KernelInput(
         t, command_t, commands, measured, pose_t, pose, np.array(sd, float), np.array(walk, float), memory_s,
-        r.setup.rig == "bench",
+        np.zeros(len(t), bool), np.zeros(len(pose_t), bool), r.setup.rig == "bench",
     )  # fmt: skip
     return Replayer(recording, inputs, pose, _first_pose(pose))
 

@@ -20,6 +20,7 @@ from gecar.reality.recordings.columns import POSE_FIELDS
 from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.channels import ResidualIndex
 from gecar.reality.replay.kernel import YAW_RATE
+from gecar.reality.replay.replayer import Replayer
 from gecar.reality.residuals.of_recording import RecordingResiduals, residuals_of
 from gecar.reality.residuals.regimes import motions
 from gecar.reality.residuals.threads import Threads
@@ -113,11 +114,11 @@ class Residuals:
         parts = []
         for run in self.recordings:
             rows, poses = len(run.replayer.t), len(run.replayer.inputs.pose_t)
-            part, t = np.zeros((4 * rows + 3 * poses, 4)), run.replayer.t
+            part = np.zeros((4 * rows + 3 * poses, 4))
             for side in range(2):
                 angle = run.replayer.measured[:, side]
                 for k, wave in enumerate((np.sin, np.cos)):
-                    left = _beyond_memory(t, ENCODER_WAVE_RAD * wave(angle), run.replayer.inputs.memory)
+                    left = _beyond_memory(run.replayer, ENCODER_WAVE_RAD * wave(angle))
                     part[side * rows : (side + 1) * rows, 2 * side + k] = left / float(run.noise.sd[0])
             parts.append(part)
         return np.concatenate(parts)[self._located[1]]
@@ -158,6 +159,10 @@ class Residuals:
         """Return the residuals of some of the recordings, by their numbers."""
         return replace(self, recordings=tuple(self.recordings[k] for k in numbers))
 
+    def and_of(self, others: Residuals) -> Residuals:
+        """Return the residuals of these recordings and of others."""
+        return replace(self, recordings=self.recordings + others.recordings)
+
     def without(self, instrument: str) -> Residuals:
         """Return these without what one of `INSTRUMENTS` measured and without nuisances.
 
@@ -172,9 +177,19 @@ class Residuals:
         seen = [run for run in self.recordings if run.tells_places]
         return replace(self, recordings=tuple(run.away_from(place, radius_m) for run in seen))
 
+    def except_at(self, rows: Sequence[Mask]) -> Residuals:
+        """Return these with motion not compared at some rows, of each recording (rows,), nor just after."""
+        there = zip(self.recordings, rows, strict=True)
+        return replace(self, recordings=tuple(run.except_at(mask) for run, mask in there))
+
     def everywhere(self) -> Residuals:
         """Return these with motion compared everywhere again."""
-        return replace(self, recordings=tuple(replace(run, unjudged=None) for run in self.recordings))
+        return replace(self, recordings=tuple(run.throughout() for run in self.recordings))
+
+    def with_memory(self, memory_s: float) -> Residuals:
+        """Return these of replays that are drawn back to the measurement over another time [s]."""
+        changed = [replace(run, replayer=run.replayer.with_memory(memory_s)) for run in self.recordings]
+        return replace(self, recordings=tuple(changed))
 
     def with_clock_offsets(self, offsets_s: Array) -> Residuals:
         """Return these with other camera clocks, shape (recordings,) [s]."""
@@ -259,16 +274,18 @@ def motion_residuals(
     return Residuals(beside, sensor=False, threads=threads)
 
 
-def _beyond_memory(t: Array, errors: Array, memory_s: float) -> Array:
+def _beyond_memory(replayer: Replayer, errors: Array) -> Array:
     """Return what remains of an encoder's errors [rad] in a replay that is drawn towards them, shape (rows,).
 
     As `gecar.reality.replay.kernel` draws wheel angles: a young mean weighs all it has seen alike, an old one forgets.
     """
+    memory_s, anew = replayer.inputs.memory, replayer.inputs.anew[replayer.first_row :]
     if math.isinf(memory_s):
         return errors
     left = np.zeros(len(errors))
     offset, weight, before = 0.0, 0.0, -math.inf
-    for k, (now, error) in enumerate(zip(t.tolist(), errors.tolist(), strict=True)):
+    for k, (now, error) in enumerate(zip(replayer.t.tolist(), errors.tolist(), strict=True)):
+        weight = 0.0 if anew[k] else weight
         if not math.isnan(error):
             weight, before = 1.0 + weight * math.exp(-(now - before) / memory_s), now
             left[k] = error - offset

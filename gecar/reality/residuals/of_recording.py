@@ -40,7 +40,7 @@ OFF_COURSE_M = -10.0  # there is bare floor
 # Standard deviations of a path by dead reckoning once its start is refined [m, m, rad].
 ODOMETRY_SD = PATH_CAUTION * np.array([0.00025, 0.00025, 0.001])
 FEWEST_POSES = 4  # that make a path
-RECOVERS_S = 0.3  # after which what happened at a place is over: a motor takes 0.1 s to its speed
+RECOVERS_S = 0.3  # after which what happened is over: a motor takes 0.1 s to its speed
 
 
 @dataclass(frozen=True)
@@ -104,9 +104,19 @@ class RecordingResiduals:
         """Return this with its motion not compared where the robot was near a place [m], nor just after."""
         t, inputs, seen = self.replayer.t, self.replayer.inputs, self._placed
         x, y = (np.interp(t, inputs.pose_t[seen], column) for column in inputs.pose[seen, :2].T)
-        near = np.hypot(x - place[0], y - place[1]) < radius_m
-        last = np.maximum.accumulate(np.where(near, t, -np.inf))
-        return replace(self, unjudged=t - last <= RECOVERS_S)
+        return self.except_at(np.hypot(x - place[0], y - place[1]) < radius_m)
+
+    def except_at(self, rows: Mask) -> RecordingResiduals:
+        """Return this with its motion not compared at some rows, shape (rows,), nor just after; then it begins anew."""
+        t = self.replayer.t
+        last = np.maximum.accumulate(np.where(rows, t, -np.inf))
+        unjudged = t - last <= RECOVERS_S
+        return replace(self, unjudged=unjudged, replayer=self.replayer.anew_at(unjudged))
+
+    def throughout(self) -> RecordingResiduals:
+        """Return this with its motion compared at all rows again."""
+        nowhere = np.zeros(len(self.replayer.t), bool)
+        return replace(self, unjudged=None, replayer=self.replayer.anew_at(nowhere))
 
     def localised(self, physics: Physics) -> RecordingResiduals:
         """Return this with the start pose its readings tell, where no camera looked; or else the bare floor it read."""

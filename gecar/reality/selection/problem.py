@@ -305,7 +305,7 @@ class Problem:
         late = "differs from recording to recording" if differ else "is early" if early else "is late"
         self.tell(f"the camera's clock {late}: it is fitted")
         others = tuple(e for e in self.catalogue if e != COMMON_DELAY)
-        return replace(self._on(fitted.with_clock_offsets(offsets)), catalogue=others, clocks_fitted=True)
+        return replace(self.on(fitted.with_clock_offsets(offsets)), catalogue=others, clocks_fitted=True)
 
     def with_clocks_beside(self, model: Model) -> Problem | None:
         """Fit the camera's clocks anew beside a model's effects, and laws; None where too little is gained by it.
@@ -318,7 +318,7 @@ class Problem:
         problem, now = self, self.cost_of(model.physics)
         before = now
         for _ in range(RENEWALS):
-            problem = problem._on(with_fitted_clocks(problem.residuals, model.physics)[0])
+            problem = problem.on(with_fitted_clocks(problem.residuals, model.physics)[0])
             model = problem.estimator.fit(model.effects, model.values)
             was, now = now, self.estimator.cost_of(problem.residuals.errors(model.physics))
             if was - now < CONVERGED:
@@ -327,9 +327,7 @@ class Problem:
 
     def filmed_as(self, other: Problem) -> Problem:
         """Return the problem with the camera's clocks and mark of another, of the same recordings."""
-        return replace(
-            self._on(other.residuals), catalogue=other.catalogue, clocks_fitted=other.clocks_fitted
-        )
+        return replace(self.on(other.residuals), catalogue=other.catalogue, clocks_fitted=other.clocks_fitted)
 
     @property
     def mark_fitted(self) -> bool:
@@ -345,7 +343,7 @@ class Problem:
         if self.residuals.sensor or self.on_bench or not headings:
             return None
         fitted, gain = with_fitted_mark(self.estimator, model.physics)
-        return self._on(fitted) if gain >= max(least_gain, PRICE) else None
+        return self.on(fitted) if gain >= max(least_gain, PRICE) else None
 
     @property
     def is_beyond_constants(self) -> bool:
@@ -356,7 +354,7 @@ class Problem:
         found = self.estimator.discrepancy
         return found is not None and float(np.delete(found.ratios, BATTERY).max()) > STANDING_OUT
 
-    def _on(self, residuals: Residuals) -> Problem:
+    def on(self, residuals: Residuals) -> Problem:
         """Return the same problem for other residuals; their discrepancy is not known yet."""
         return self._anew(Estimator(residuals, self.estimator.robot, self.estimator.rng))
 

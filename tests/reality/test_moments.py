@@ -1,0 +1,67 @@
+"""Where something unknown acts now and then, the other moments tell of effects all the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from support.concealing import EV3, motion_of, recorded
+
+from gecar.reality.discovery import discover
+from gecar.reality.locate.moments import moments
+from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.selection.problem import problem_of
+from gecar.world.effects import CATALOGUE
+from gecar.world.robot import Robot
+
+LOST_S = 0.4
+OVER_S = 0.8  # after which a replay with a memory of a second has forgotten what happened
+
+
+def losing(robot: Robot, seed: int) -> Recording:
+    """Return a drive whose log claims another command, at one moment, than the robot followed."""
+    run, rng = recorded(robot, seed, seconds=12.0), np.random.default_rng(seed)
+    left, right = run.left_duty.copy(), run.right_duty.copy()
+    left[_lost(run, seed)], right[_lost(run, seed)] = rng.choice([-0.4, 0.4], 2)
+    return replace(run, left_duty=left, right_duty=right)
+
+
+def _lost(run: Recording, seed: int, after_s: float = 0.0) -> npt.NDArray[np.bool_]:
+    first = 1.0 + 1.5 * seed
+    return (run.t_s >= first) & (run.t_s < first + LOST_S + after_s)
+
+
+def test_moments_at_which_commands_were_lost_are_told_beside_an_effect_of_any_size() -> None:
+    robot = EV3.with_effects({"wheel_radius": {"scale": 0.96}})
+    runs = [losing(robot, seed) for seed in range(3)]
+    fitted = motion_of(runs)
+    problem = problem_of(fitted, EV3, [effect.id for effect in CATALOGUE if effect.id == "wheel_radius"])
+    told, aside = moments(problem, problem.known, motion_of([losing(robot, 3)]))
+    for run, seed, rows in zip((*runs, losing(robot, 3)), range(4), (*told, *aside), strict=True):
+        assert rows[_lost(run, seed)].mean() > 0.6
+        assert rows[~_lost(run, seed, OVER_S)].mean() < 0.03
+    except_there = fitted.except_at(told)
+    assert len(except_there.index.t_s) > 0.5 * len(fitted.index.t_s)
+    assert except_there.everywhere().index.t_s.tolist() == fitted.index.t_s.tolist()
+
+
+def test_noise_alone_makes_no_moment() -> None:
+    fitted = motion_of([recorded(EV3, seed) for seed in range(3)])
+    problem = problem_of(fitted, EV3, ["wheel_radius", "viscous_friction"])
+    told, aside = moments(problem, problem.known, motion_of([recorded(EV3, 3)]))
+    assert np.concatenate([*told, *aside]).mean() < 0.01
+
+
+@pytest.mark.parametrize("size", [-0.012, pytest.param(0.0, marks=pytest.mark.slow)])
+def test_an_effect_is_named_beside_lost_commands_and_none_where_there_is_none(size: float) -> None:
+    robot = EV3.with_effects({"wheel_radius_difference": {"right_minus_left": size}})
+    verdict = discover(Case("made", tuple(losing(robot, seed) for seed in range(4))))
+    assert {found.id for found in verdict.effects} == ({"wheel_radius_difference"} if size else set())
+    assert verdict.verdict == ("missing_and_unexplained" if size else "unexplained")
+    (told,) = [note for note in verdict.notes if note.startswith("At some moments")] or [""]
+    assert ("run_1 at 2." in told) == bool(size)
+    for found in verdict.effects:
+        span = found.parameters["right_minus_left"]
+        assert span.low <= size <= span.high
