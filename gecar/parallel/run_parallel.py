@@ -130,7 +130,7 @@ def perform_each(
             deaths = 1 if len(left) < before else deaths + 1
             _say_death(deaths)
         except BaseException:
-            _stop_workers()
+            stop_workers()
             raise
         finally:
             executor.shutdown(wait=False, cancel_futures=True)
@@ -145,7 +145,7 @@ def _say_death(deaths: int) -> None:
     print("a worker died; new ones were started, and their work is repeated", file=sys.stderr, flush=True)
 
 
-def _stop_workers() -> None:
+def stop_workers() -> None:
     """End this process's workers at once: nobody wants what they are in the middle of."""
     for worker in multiprocessing.active_children():
         worker.terminate()
