@@ -19,6 +19,7 @@ from gecar.language.opcodes import N_COLUMNS
 from gecar.language.program import Program
 from gecar.parallel.executors import MAX_DEATHS, QUIET_S, SerialExecutor
 from gecar.parallel.pickled import pickled
+from gecar.parallel.run_parallel import stop_workers
 from gecar.search.evaluation import Batch, Evaluator, Scored, score_batch
 
 LONGEST_S = 0.1
@@ -65,6 +66,8 @@ class Batches:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if kind is not None:
+            stop_workers()  # one that a Ctrl-C ended as it started may hold what another waits for
         self.close()
 
     def warm(self) -> None:

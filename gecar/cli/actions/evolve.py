@@ -15,7 +15,6 @@ from gecar.cli.output import Output
 from gecar.cli.progress import Watch
 from gecar.compiled import is_cold, mark_warm
 from gecar.evolution.scores import UNSOLVED
-from gecar.parallel.run_parallel import stop_workers
 from gecar.report.drive import arrival_of, sentence_of, standing_of
 from gecar.report.runs import courses_title, effort_of, front_table
 from gecar.results.config import configure, merged, read_config
@@ -107,7 +106,6 @@ def finish_watched(started: Started, quiet: bool) -> dict[str, Any]:
         with Watch(evolution.history, evolution.settings.generations, quiet) as watch:
             result = finish(started, watch)
     except KeyboardInterrupt:  # how to go on has been said
-        stop_workers()  # one that died as it started may hold what another waits for
         raise typer.Exit(130) from None
     mark_warm()
     return result
