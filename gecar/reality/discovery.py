@@ -373,9 +373,9 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     elsewhere = _explained_elsewhere(context, found.explained, found.candidates, problem.residuals, held)
     if elsewhere or not motion.explained.unexplained:
         return elsewhere or found
-    others = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
-    without = next(filter(None, others), None)
-    return without or _explained_at_other_moments(context, found.explained, problem.residuals, held) or found
+    without = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
+    in_part = next(filter(None, without), None)
+    return in_part or _explained_at_other_moments(context, found.explained, problem.residuals, held) or found
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
@@ -417,7 +417,10 @@ def _explained_elsewhere(
 def _explained_at_other_moments(
     context: _Context, before: Explanation, fitted: Residuals, held: Residuals
 ) -> _Stage | None:
-    """Explain motion without the moments at which something unknown acts; None if few, or many, or that fails."""
+    """Explain motion without the moments at which something unknown acts.
+
+    None if there are hardly any, or so many that too little is left, or if nothing explains the others.
+    """
     problem, taken = before.problem, before.taken
     if problem.on_bench:
         return None

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from gecar.reality.fitting.model import Step
 from gecar.reality.materiality import Size
@@ -14,6 +13,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.recordings.split import ENOUGH_S, Split
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.residuals.regimes import spans_of
 from gecar.reality.verdict import Invented
 from gecar.world.effects import BY_ID
 from gecar.world.robot import Robot
@@ -30,7 +30,7 @@ WITHOUT = {
     "poses": "The poses have an error of their own, which no effect of the catalogue explains. They were left out: "
     "what was found explains how the wheels turned. Check whether the camera was moved, and its frame.",
 }
-"""What is said where an instrument was left out."""
+"""What a verdict says of an instrument that was left out, by its name."""
 MOST_MOMENTS = 4  # that are given
 
 
@@ -149,25 +149,19 @@ def note_on_place(place: tuple[float, float]) -> str:
 
 
 def note_on_moments(residuals: Residuals) -> str:
-    """Return a note on the moments at which the motion of recordings is not compared."""
-    spans = [
-        (t[last] - t[first], f"{run.recording.name} at {t[first]:.1f}-{t[last]:.1f} s")
-        for run in residuals.recordings
-        for t, first, last in _not_compared(run)
-    ]
+    """Return a note on the moments that were left out of recordings."""
+    spans = []
+    for run in residuals.recordings:
+        t = run.replayer.t
+        for first, after in spans_of(run.replayer.anew):
+            begin, end = t[first], t[after - 1]
+            spans.append((end - begin, f"{run.recording.name} at {begin:.1f}-{end:.1f} s"))
     longest = sorted(spans, reverse=True)[:MOST_MOMENTS]
     return (
         "At some moments something acts that no effect of the catalogue explains. They were left out, of those fitted"
         f" on mainly {', '.join(where for _, where in longest)}: what was found explains the others. Look at what"
         " happened then, and whether all commands arrived."
     )
-
-
-def _not_compared(run: RecordingResiduals) -> list[tuple[npt.NDArray[np.float64], int, int]]:
-    """Return the times of a recording's rows [s], and the first and last row of each span that is not compared."""
-    rows = run.unjudged if run.unjudged is not None else np.zeros(len(run.replayer.t), bool)
-    begins, ends = (np.flatnonzero(np.diff(np.r_[0, rows, 0]) == step) for step in (1, -1))
-    return [(run.replayer.t, int(first), int(end) - 1) for first, end in zip(begins, ends, strict=True)]
 
 
 def note_on_astray(name: str, size: Size) -> str:

@@ -13,7 +13,7 @@ from gecar.reality.locate.misfit_energy import misfit_energy, noise_inflation
 from gecar.reality.locate.shift_test import DRAWS, best_disc, regime_p
 from gecar.reality.replay.channels import CHANNELS, REFLECTION, ResidualIndex
 from gecar.reality.residuals.of_recording import RecordingResiduals
-from gecar.reality.residuals.regimes import regime_masks
+from gecar.reality.residuals.regimes import regime_masks, spans_of
 from gecar.reality.selection.thresholds import NEGLIGIBLE, SIGNIFICANCE
 from gecar.reality.verdict import Place
 
@@ -192,9 +192,9 @@ class MismatchMap:
         kept[order[: 1 + int(np.searchsorted(gathered, STRONGEST * gathered[-1]))]] = True
         kept = kept.reshape(strong.shape)
         strongest = int(np.argmax(np.where(kept, strong, 0.0).sum(axis=1)))
-        edges = np.flatnonzero(np.diff(np.r_[0, kept[strongest].astype(int), 0])) * SPAN_BINS * BIN_S
-        pairs = zip(edges[::2], edges[1::2], strict=True)
-        return strongest, tuple((round(float(a), 2), round(float(b), 2)) for a, b in pairs)
+        span_s = SPAN_BINS * BIN_S
+        pairs = spans_of(kept[strongest])
+        return strongest, tuple((round(a * span_s, 2), round(b * span_s, 2)) for a, b in pairs)
 
     def _throughout(self, channel: int) -> Place:
         """Return the entry of a channel that is off whatever the motion: the last resort."""

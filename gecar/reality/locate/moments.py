@@ -10,6 +10,8 @@ concentration steps).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -46,7 +48,9 @@ def moments(problem: Problem, model: Model, held: Residuals) -> tuple[list[Mask]
         At which rows of each recording, shape (rows,), and of each that is set aside.
     """
     number = len(problem.recordings)
-    problem = problem.on(problem.residuals.and_of(held).with_memory(QUICK_S))
+    # Hundreds of waves of a ripple could be fitted to anything that happens to one recording.
+    catalogue = tuple(effect for effect in problem.catalogue if effect != RIPPLE)
+    problem = replace(problem.on(problem.residuals.and_of(held).with_memory(QUICK_S)), catalogue=catalogue)
     index = problem.residuals.index
     acting = _acting(problem, problem.estimator.at(model, model.z), index.recording < number)
     rows = [
@@ -57,10 +61,8 @@ def moments(problem: Problem, model: Model, held: Residuals) -> tuple[list[Mask]
 
 
 def _acting(problem: Problem, model: Model, telling: Mask) -> Mask:
-    """Return at which residuals something acts, shape (n,); some are ``telling`` which changes there are."""
-    changes = small_sensitivities(problem, model)
-    # Hundreds of waves could be fitted to anything that happens to one recording.
-    slopes = LARGE * np.concatenate([changes[effect] for effect in changes if effect != RIPPLE], axis=1)
+    """Return at which residuals something acts, shape (n,); changes are fitted to those that are ``telling``, (n,)."""
+    slopes = LARGE * np.concatenate([*small_sensitivities(problem, model).values()], axis=1)
     errors, blocks = problem.residuals.errors(model.physics), problem.estimator.blocks
     judged, scale = telling, telling.astype(float)
     for _ in range(ROUNDS):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cached_property
+
 import numpy as np
 import numpy.typing as npt
 
@@ -35,8 +38,6 @@ class Blocks:
         Samples in each, shape (count,).
     recording, t_s
         Where each lies, and its middle [s], shape (count,).
-    moments
-        Moments, shape (n,): a block's time, in all channels.
     """
 
     def __init__(self, index: ResidualIndex) -> None:
@@ -53,8 +54,12 @@ class Blocks:
         self.recording[self._of] = index.recording
         self.t_s = np.bincount(self._of, index.t_s, self.count) / np.maximum(self.samples, 1)
         self._later = self._blocks_later(round(LASTING_S / BLOCK_S))
-        at = index.recording.astype(np.int64) * 10_000_000 + (index.t_s / BLOCK_S).astype(np.int64)
-        self.moments = np.unique(at, return_inverse=True)[1]
+        self._index = index
+
+    @cached_property
+    def moments(self) -> npt.NDArray[np.int64]:
+        """Moments, shape (n,): a block's time, in all channels."""
+        return _group(replace(self._index, channel=np.zeros_like(self._index.channel)), BLOCK_S)
 
     def excess_energy(self, errors: Array, inflation: Array | None = None) -> float:
         """Return the energy of block means above what noise would leave.
@@ -75,10 +80,8 @@ class Blocks:
         are left out: their own errors go with the shaft's angle, not with the place.
         """
         energy = self.sums(np.clip(errors, -CLIP, CLIP)) ** 2 / self.samples
-        typical = np.ones(len(CHANNELS))
-        for channel in np.unique(self._channel):
-            typical[channel] = max(_typical(energy[self._channel == channel]), 1.0)
-        out: Array = np.where(np.isin(self._channel, ENCODERS), 0.0, energy / typical[self._channel] - 1.0)
+        typical = self._typical_by_block(energy, np.ones(self.count, bool))
+        out: Array = np.where(np.isin(self._channel, ENCODERS), 0.0, energy / typical - 1.0)
         return out
 
     def energy_by_moment(self, errors: Array, judged: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -98,13 +101,10 @@ class Blocks:
             has, shape (n,), no less than its sensor's noise.
         """
         energy = self.sums(errors) ** 2 / self.samples
-        counted, typical = self.sums(judged.astype(float)) > 0.0, np.ones(len(CHANNELS))
-        for channel in np.unique(self._channel[counted]):
-            typical[channel] = max(_typical(energy[counted & (self._channel == channel)]), 1.0)
+        typical = self._typical_by_block(energy, self.sums(judged.astype(float)) > 0.0)
         of = np.zeros(self.count, np.int64)
         of[self._of] = self.moments
-        sums = np.bincount(of, energy / typical[self._channel])
-        return sums / np.bincount(of), np.sqrt(typical[self._channel])[self._of]
+        return np.bincount(of, energy / typical) / np.bincount(of), np.sqrt(typical)[self._of]
 
     def excess_energy_of_sums(self, sums: Array) -> float:
         """Return the excess energy of residuals of which only each block's sum is known, shape (blocks,)."""
@@ -155,6 +155,13 @@ class Blocks:
                     typical = min(typical, float(np.median(change)) / CHI_SQUARE_MEDIAN)
                 out[channel] = np.clip(typical, 1.0, LARGEST_INFLATION)
         return out
+
+    def _typical_by_block(self, energy: Array, counted: npt.NDArray[np.bool_]) -> Array:
+        """Return the energy of the typical counted block of each block's channel, no less than noise, (blocks,)."""
+        typical = np.ones(len(CHANNELS))
+        for channel in np.unique(self._channel[counted]):
+            typical[channel] = max(_typical(energy[counted & (self._channel == channel)]), 1.0)
+        return typical[self._channel]
 
     def _blocks_later(self, lag: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return pairs of blocks of one recording and channel that lie so many blocks apart."""

@@ -127,6 +127,11 @@ class Replayer:
         return self.inputs.measured[self.first_row :]
 
     @property
+    def anew(self) -> npt.NDArray[np.bool_]:
+        """At which rows it forgets what was measured before, shape (rows,)."""
+        return self.inputs.anew[self.first_row :]
+
+    @property
     def has_poses(self) -> bool:
         """Whether a camera saw the robot at all."""
         return len(self.inputs.pose_t) > 0
@@ -152,7 +157,7 @@ class Replayer:
         return replace(self, inputs=self.inputs._replace(memory=np.inf))
 
     def with_memory(self, memory_s: float) -> Replayer:
-        """Return this to be drawn back to the measurement over another time [s].
+        """Return this with another memory [s]: over how long it is drawn back to the measurement.
 
         A steady filter on a random walk forgets in inverse proportion to the walk.
         """

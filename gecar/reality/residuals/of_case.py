@@ -187,7 +187,7 @@ class Residuals:
         return replace(self, recordings=tuple(run.throughout() for run in self.recordings))
 
     def with_memory(self, memory_s: float) -> Residuals:
-        """Return these of replays that are drawn back to the measurement over another time [s]."""
+        """Return these of replays with another memory [s], as `Replayer.with_memory`."""
         changed = [replace(run, replayer=run.replayer.with_memory(memory_s)) for run in self.recordings]
         return replace(self, recordings=tuple(changed))
 
@@ -279,7 +279,7 @@ def _beyond_memory(replayer: Replayer, errors: Array) -> Array:
 
     As `gecar.reality.replay.kernel` draws wheel angles: a young mean weighs all it has seen alike, an old one forgets.
     """
-    memory_s, anew = replayer.inputs.memory, replayer.inputs.anew[replayer.first_row :]
+    memory_s, anew = replayer.inputs.memory, replayer.anew
     if math.isinf(memory_s):
         return errors
     left = np.zeros(len(errors))

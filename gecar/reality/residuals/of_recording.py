@@ -57,8 +57,8 @@ class RecordingResiduals:
         What its colour sensor read; None where it read none.
     nuisances
         What it has of its own.
-    unjudged
-        At which rows the motion is not compared, shape (rows,); None: it is at all of them.
+    in_part
+        Whether the motion is compared in part only: not at the rows at which its replay begins anew.
     """
 
     recording: Recording
@@ -66,7 +66,7 @@ class RecordingResiduals:
     replayer: Replayer
     course: Course | None
     nuisances: Nuisances = field(default_factory=Nuisances)
-    unjudged: Mask | None = None
+    in_part: bool = False
 
     @property
     def reads(self) -> bool:
@@ -110,13 +110,12 @@ class RecordingResiduals:
         """Return this with its motion not compared at some rows, shape (rows,), nor just after; then it begins anew."""
         t = self.replayer.t
         last = np.maximum.accumulate(np.where(rows, t, -np.inf))
-        unjudged = t - last <= RECOVERS_S
-        return replace(self, unjudged=unjudged, replayer=self.replayer.anew_at(unjudged))
+        return replace(self, in_part=True, replayer=self.replayer.anew_at(t - last <= RECOVERS_S))
 
     def throughout(self) -> RecordingResiduals:
         """Return this with its motion compared at all rows again."""
         nowhere = np.zeros(len(self.replayer.t), bool)
-        return replace(self, unjudged=None, replayer=self.replayer.anew_at(nowhere))
+        return replace(self, in_part=False, replayer=self.replayer.anew_at(nowhere))
 
     def localised(self, physics: Physics) -> RecordingResiduals:
         """Return this with the start pose its readings tell, where no camera looked; or else the bare floor it read."""
@@ -222,8 +221,7 @@ class RecordingResiduals:
         channel = np.r_[np.repeat(np.arange(4), len(t)), np.repeat(np.arange(4, 7), len(inputs.pose_t))]
         times = np.concatenate([np.tile(t, 4), np.tile(inputs.pose_t, 3)])
         there = ~np.isnan(np.concatenate([self.replayer.measured.T.ravel(), inputs.pose.T.ravel()]))
-        if self.unjudged is not None:
-            there &= ~self.unjudged[np.minimum(np.searchsorted(t, times), len(t) - 1)]
+        there &= ~np.r_[np.tile(self.replayer.anew, 4), np.tile(inputs.pose_anew, 3)]
         return _index(number, channel, times), there
 
     def sensor_index(self, number: int) -> tuple[ResidualIndex, Mask]:

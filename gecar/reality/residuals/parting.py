@@ -168,7 +168,7 @@ def _left(run: RecordingResiduals, physics: Physics, inflation: Array) -> Size |
     out, track = Size(), float(physics["track_width"][0])
     rows = _replayed(run, physics).rows
     path, wheels = rows[:, PLACE], _reckoned(run, physics, rows)
-    if run.unjudged is not None:
+    if run.in_part:
         return _left_elsewhere(run, physics, path, wheels, inflation)
     if run.replayer.has_poses:
         seen = measured_path(run.replayer, physics)
@@ -201,8 +201,7 @@ def _left_elsewhere(
     run: RecordingResiduals, physics: Physics, path: Array, wheels: Array, inflation: Array
 ) -> Size | None:
     """Return how far a robot's path parts from the poses seen, over windows of a metre that are judged throughout."""
-    assert run.unjudged is not None
-    passed = np.r_[0, np.cumsum(run.unjudged)]
+    passed = np.r_[0, np.cumsum(run.replayer.anew)]
     first, last = _windows(wheels, float(physics["track_width"][0]))
     judged = passed[last + 1] == passed[first]
     if not judged.any():

@@ -39,6 +39,12 @@ def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mas
     return {**_motions(rows, run.recording.commands, lasting), **_headings(pose[:, 2], placed)}
 
 
+def spans_of(mask: Mask) -> list[tuple[int, int]]:
+    """Return where each unbroken span of a mask, shape (n,), begins, and where the first member after it is."""
+    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int)))
+    return [(int(first), int(after)) for first, after in edges.reshape(-1, 2)]
+
+
 def _table(
     run: RecordingResiduals, physics: npt.NDArray[Any], bins: int, bin_s: float
 ) -> tuple[dict[str, Mask], Array]:
