@@ -51,6 +51,11 @@ def test_intervals_hold_the_truth_as_often_as_they_say(recordings: int) -> None:
     assert np.mean(held) > 0.92
 
 
+def test_a_model_without_parameters_has_no_intervals() -> None:
+    problem = linear_problem(linear({}, {VISCOUS: bumps(1, 4, 0.2)}))
+    assert half_widths(problem.estimator, fitted(problem)).shape == (0,)
+
+
 def test_where_recordings_disagree_few_of_them_widen_an_interval_by_student_s_t() -> None:
     """One recording says 5, the other three 4: with three degrees of freedom, 3.18 standard errors, not 1.96."""
     problem = linear_problem(linear({VISCOUS: 4.0}, {VISCOUS: np.tile(bumps(1, 1, 1.0), 4)}))

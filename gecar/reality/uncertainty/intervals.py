@@ -48,6 +48,8 @@ def half_widths(estimator: Estimator, model: Model) -> Array:
 
 def half_widths_of(slopes: Array, errors: Array, blocks: Blocks) -> Array:
     """Return the same of any fit, from its residuals, shape (n,), and their sensitivities, (n, k)."""
+    if not slopes.shape[1]:  # a law may have no constants
+        return np.zeros(0)
     w = weights(errors)
     normal = slopes.T @ (w[:, None] * slopes)
     inverse = np.linalg.pinv(normal + 1e-9 * np.diag(np.diag(normal)), hermitian=True)
