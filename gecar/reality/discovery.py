@@ -19,6 +19,7 @@ from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import (
     WITHOUT,
     note_on_astray,
+    note_on_kind,
     note_on_moments,
     note_on_place,
     notes_on_findings,
@@ -34,7 +35,7 @@ from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import ABOUT_M, middle, strongest_place, with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
-from gecar.reality.locate.moments import moments
+from gecar.reality.locate.moments import kind_of_driving, moments
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
@@ -44,6 +45,7 @@ from gecar.reality.prove.confirmation import (
     dropped,
     explained_and_confirmed,
     standing_out,
+    steady,
     with_better_readings,
 )
 from gecar.reality.prove.holdout import Contender, judge
@@ -55,7 +57,7 @@ from gecar.reality.residuals.compilation import compiled_replays
 from gecar.reality.residuals.of_case import INSTRUMENTS, Physics, Residuals, motion_residuals
 from gecar.reality.residuals.parting import logs_apart
 from gecar.reality.residuals.threads import Threads
-from gecar.reality.selection.acceptance import size_of, stands_out, worsens
+from gecar.reality.selection.acceptance import size_of, worsens
 from gecar.reality.selection.alternatives import alternatives, late_as_well
 from gecar.reality.selection.observability import observable
 from gecar.reality.selection.problem import Problem, problem_of
@@ -254,7 +256,13 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
         fitted_on=tuple(r.name for r in split.fitted),
         notes=(
             *notes_on_findings(
-                split, found, candidates, unseen, invented, motion.left_out, _alike(explained)
+                split,
+                found,
+                candidates,
+                unseen,
+                invented,
+                motion.left_out or motion.acts,
+                _alike(explained),
             ),
             *notes_on_recordings(
                 split, context.split, fitted, explained.problem.clocks_fitted, where.doubted
@@ -342,7 +350,10 @@ class _Stage(Confirmation):
     laws, invented
         The laws, and what the verdict says of them.
     left_out
-        What is said of an instrument, a place or moments that nothing explains, so that they were left out.
+        What is said of an instrument, a place, a kind of driving or moments that nothing explains, so that they were
+        left out.
+    acts
+        What is said of a kind of driving in which something acts where nothing explains the rest, either.
     """
 
     spans: Spans
@@ -350,14 +361,15 @@ class _Stage(Confirmation):
     laws: tuple[Term, ...] = ()
     invented: tuple[Invented, ...] = ()
     left_out: str = ""
+    acts: str = ""
 
 
 def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: Confirmation) -> _Stage:
     """Explain how the robot moved: by the effects that were seen, by effects and laws, or by laws alone.
 
     Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
-    anew. What is left may be at one place on the floor, or else one instrument may be wrong, or something acts now and
-    then.
+    anew. What is left may be at one place on the floor, or else one instrument may be wrong, or something acts in one
+    kind of driving, or now and then.
     """
     motion = _motion(context, seen, held)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
@@ -375,7 +387,7 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
         return elsewhere or found
     without = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
     in_part = next(filter(None, without), None)
-    return in_part or _explained_at_other_moments(context, found.explained, problem.residuals, held) or found
+    return in_part or _explained_at_other_times(context, found, problem.residuals, held)
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
@@ -414,24 +426,32 @@ def _explained_elsewhere(
     return replace(motion, explained=replace(motion.explained, spot=spot), left_out=note_on_place(spot))
 
 
-def _explained_at_other_moments(
-    context: _Context, before: Explanation, fitted: Residuals, held: Residuals
-) -> _Stage | None:
-    """Explain motion without the moments at which something unknown acts.
+def _explained_at_other_times(context: _Context, found: _Stage, fitted: Residuals, held: Residuals) -> _Stage:
+    """Explain motion without the kind of driving, or else the moments, in which something unknown acts.
 
-    None if there are hardly any, or so many that too little is left, or if nothing explains the others.
+    It stays as it is if there are hardly any, or so many that too little is left, or if no effect explains the others.
     """
-    problem, taken = before.problem, before.taken
+    problem, taken = found.explained.problem, found.explained.taken
     if problem.on_bench:
-        return None
-    acting, aside = moments(problem, taken, problem.with_its_camera(held, taken.physics))
-    alone, beside = fitted.except_at(acting), held.except_at(aside)
-    share = len(alone.index.t_s) / max(len(fitted.index.t_s), 1)
-    if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
-        return None
-    context.tell("something acts at some moments: once more without those")
-    motion = _explained_in_part(context, alone, beside, fitted)
-    return motion and replace(motion, left_out=note_on_moments(alone))
+        return found
+    beside = problem.with_its_camera(held, taken.physics)
+    for told in (kind_of_driving, moments):
+        acting = told(problem, taken, beside)
+        if acting is None:
+            continue
+        alone, others = fitted.except_at(acting.fitted), held.except_at(acting.held)
+        share = len(alone.index.t_s) / max(len(fitted.index.t_s), 1)
+        if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
+            continue
+        when = acting.kind or "at some moments"
+        context.tell(f"something acts {when}: once more without what happened then")
+        motion = _explained_in_part(context, alone, others, fitted)
+        if motion is not None:
+            note = note_on_kind(acting.kind, acting.left, True) if acting.kind else note_on_moments(alone)
+            return replace(motion, left_out=note)
+        if acting.kind:
+            found = replace(found, acts=note_on_kind(acting.kind, acting.left, False))
+    return found
 
 
 def _explained_in_part(
@@ -446,14 +466,9 @@ def _explained_in_part(
     explained = explain(problem, once_more=True)
     if explained.unexplained or not explained.steps:
         return None
-    motion = _with_intervals(context, confirmed(explained, held, in_part=True), held)
+    motion = _with_intervals(context, steady(confirmed(explained, held, in_part=True)), held)
     found, whole = motion.explained, problem.sizes.of(fitted)
-    if (
-        not found.steps
-        or found.unexplained
-        or not all(stands_out(found.problem, step) for step in found.steps)
-        or worsens(problem, problem.known, found.taken, whole)
-    ):
+    if not found.steps or found.unexplained or worsens(problem, problem.known, found.taken, whole):
         return None
     return replace(motion, explained=replace(found, left=whole.left(found.taken.physics), unexplained=True))
 

@@ -59,7 +59,7 @@ def notes_on_findings(
     invented
         Laws found.
     left_out
-        What is said of an instrument, a place or moments that were left out.
+        What is said of an instrument, a place or times that were left out, or in which something unknown acts.
     alike
         Sets of effects of which one can be larger and another smaller at hardly any cost.
     """
@@ -161,6 +161,29 @@ def note_on_moments(residuals: Residuals) -> str:
         "At some moments something acts that no effect of the catalogue explains. They were left out, of those fitted"
         f" on mainly {', '.join(where for _, where in longest)}: what was found explains the others. Look at what"
         " happened then, and whether all commands arrived."
+    )
+
+
+def note_on_kind(kind: str, left: float, left_out: bool) -> str:
+    """Return a note on a kind of driving in which something unknown acts.
+
+    Parameters
+    ----------
+    kind
+        As `gecar.reality.residuals.regimes.kinds_of_driving` says it.
+    left
+        The share of the residuals' energy that changes of constants leave without it.
+    left_out
+        Whether effects were found without it.
+    """
+    if left_out:
+        return (
+            f"Something acts that no effect of the catalogue explains, mainly {kind}. What the robot did then was left"
+            " out: what was found explains the rest. Look at what the robot does then that it does at no other time."
+        )
+    return (
+        f"What no effect of the catalogue explains acts mainly {kind}: without that, changes of the robot's constants"
+        f" leave {100.0 * left:.0f} % of the residuals' energy."
     )
 
 

@@ -1,8 +1,9 @@
-"""Moments at which something acts that not even large changes of all of a robot's constants explain.
+"""When something acts that not even large changes of all constants explain: at moments, or in a kind of driving.
 
-What acts now and then (a bump, a command that is lost, a limit that few commands reach) leaves most of a recording as
-it is, and would count as noise in all of it. The changes of constants that explain the other moments best tell which
-moments these are: in turns, until both agree.
+What acts now and then (a bump, a command that is lost), or in one kind of driving (gears that bind while the wheels
+turn opposite ways), leaves most of a recording as it is, and would count as noise in all of it. The changes of
+constants that explain the rest best tell when it acts: for moments in turns, until both agree; of kinds of driving that
+one counts without which they explain the rest far better.
 
 Source: Rousseeuw and Van Driessen, Data Mining and Knowledge Discovery 12 (2006) 29 (least trimmed squares by
 concentration steps).
@@ -10,30 +11,103 @@ concentration steps).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gecar.reality.fitting.estimator import RIPPLE
 from gecar.reality.fitting.model import Model
-from gecar.reality.noise.excess_energy import BLOCK_S
+from gecar.reality.locate.shift_test import regime_p
+from gecar.reality.noise.excess_energy import BLOCK_S, Blocks
 from gecar.reality.optimisation.least_squares import weights
 from gecar.reality.residuals.of_case import Residuals
 from gecar.reality.residuals.of_recording import RecordingResiduals
+from gecar.reality.residuals.regimes import kinds_of_driving
 from gecar.reality.selection.problem import Problem, small_sensitivities
-from gecar.reality.selection.thresholds import LARGE
+from gecar.reality.selection.thresholds import LARGE, SIGNIFICANCE
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 ROUNDS = 8
-QUICK_S = 0.1  # memory of the replays that tell moments: what happened shall not last
+QUICK_S = 0.1  # memory of the replays that tell when something acts: what happened shall not last
 ACTING = 4.0  # times a typical moment's energy: one of a thousand is as large where there is noise alone
+KIND = 0.7  # of the energy may be left without a kind of driving
+AS_WELL = 1.1  # times the least energy left: of kinds that tell as well the one that leaves most counts
+MOST_LEFT_OUT = 0.5  # of all residuals, with a kind of driving
+CLIP = 100.0  # energy of a block in units of the sensors' noise: what is larger is not told apart
 
 
-def moments(problem: Problem, model: Model, held: Residuals) -> tuple[list[Mask], list[Mask]]:
-    """Return when something acts that no change of a model's constants explains.
+class Acting(NamedTuple):
+    """When something acts.
+
+    Attributes
+    ----------
+    kind
+        In which kind of driving; empty for moments.
+    fitted, held
+        At which rows of each recording, shape (rows,), and of each that is set aside.
+    left
+        The share of the energy that changes of constants leave without a kind of driving.
+    """
+
+    kind: str
+    fitted: list[Mask]
+    held: list[Mask]
+    left: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Quick:
+    """Quick replays of recordings fitted on and of others, and what large changes of all constants do to them.
+
+    Attributes
+    ----------
+    residuals
+        Of these replays; the first ``number`` recordings tell the changes.
+    errors, slopes
+        The residuals, shape (n,), and their derivatives by large changes, shape (n, changes).
+    telling
+        Which residuals tell the changes, shape (n,).
+    """
+
+    residuals: Residuals
+    blocks: Blocks
+    number: int
+    errors: Array
+    slopes: Array
+    telling: Mask
+
+    @classmethod
+    def of(cls, problem: Problem, model: Model, held: Residuals) -> _Quick:
+        # Hundreds of waves of a ripple could be fitted to anything that happens to one recording.
+        catalogue = tuple(effect for effect in problem.catalogue if effect != RIPPLE)
+        number = len(problem.recordings)
+        problem = replace(
+            problem.on(problem.residuals.and_of(held).with_memory(QUICK_S)), catalogue=catalogue
+        )
+        model = problem.estimator.at(model, model.z)
+        slopes = LARGE * np.concatenate([*small_sensitivities(problem, model).values()], axis=1)
+        residuals = problem.residuals
+        errors, telling = residuals.errors(model.physics), residuals.index.recording < number
+        return cls(residuals, problem.estimator.blocks, number, errors, slopes, telling)
+
+    def left(self, scale: Array) -> Array:
+        """Return what the changes leave that explain the residuals best, each scaled, shape (n,)."""
+        columns = self.slopes * scale[:, None]
+        gram = columns.T @ columns + np.eye(self.slopes.shape[1])
+        out: Array = self.errors - self.slopes @ np.linalg.solve(gram, (self.errors * scale) @ columns)
+        return out
+
+    def acting(self, rows: list[Mask], kind: str = "", left: float = 1.0) -> Acting:
+        """Return when something acts, by rows of all recordings."""
+        return Acting(kind, rows[: self.number], rows[self.number :], left)
+
+
+def moments(problem: Problem, model: Model, held: Residuals) -> Acting:
+    """Return the moments at which something acts that no change of a model's constants explains.
 
     Parameters
     ----------
@@ -41,34 +115,86 @@ def moments(problem: Problem, model: Model, held: Residuals) -> tuple[list[Mask]
         Of recordings that tell the changes.
     held
         Recordings set aside: of these no change is fitted.
-
-    Returns
-    -------
-    tuple
-        At which rows of each recording, shape (rows,), and of each that is set aside.
     """
-    number = len(problem.recordings)
-    # Hundreds of waves of a ripple could be fitted to anything that happens to one recording.
-    catalogue = tuple(effect for effect in problem.catalogue if effect != RIPPLE)
-    problem = replace(problem.on(problem.residuals.and_of(held).with_memory(QUICK_S)), catalogue=catalogue)
-    index = problem.residuals.index
-    acting = _acting(problem, problem.estimator.at(model, model.z), index.recording < number)
+    quick = _Quick.of(problem, model, held)
+    acting, index = _acting(quick), quick.residuals.index
     rows = [
         _at_rows(run, index.t_s[acting & (index.recording == k)])
-        for k, run in enumerate(problem.residuals.recordings)
+        for k, run in enumerate(quick.residuals.recordings)
     ]
-    return rows[:number], rows[number:]
+    return quick.acting(rows)
 
 
-def _acting(problem: Problem, model: Model, telling: Mask) -> Mask:
-    """Return at which residuals something acts, shape (n,); changes are fitted to those that are ``telling``, (n,)."""
-    slopes = LARGE * np.concatenate([*small_sensitivities(problem, model).values()], axis=1)
-    errors, blocks = problem.residuals.errors(model.physics), problem.estimator.blocks
+def kind_of_driving(problem: Problem, model: Model, held: Residuals) -> Acting | None:
+    """Return the kind of driving in which something acts; None if no kind tells; parameters as for `moments`.
+
+    Without it, changes of a model's constants must leave far less energy of all the rest than of everything.
+    """
+    quick = _Quick.of(problem, model, held)
+    runs = quick.residuals.recordings
+    largest = max(float(np.abs(run.recording.commands).max()) for run in runs)
+    tables = [kinds_of_driving(run, largest) for run in runs]
+    whole, found = _energy_beside(quick, np.zeros(len(quick.errors), bool)), []
+    for kind in tables[0]:
+        inside = _among_residuals(quick.residuals, [table[kind] for table in tables])
+        share = float(inside[quick.telling].mean())
+        if 0.0 < share <= MOST_LEFT_OUT:
+            found.append((_energy_beside(quick, inside) / whole, share, kind, inside))
+    least = min((left for left, *_ in found), default=np.inf)
+    if least > KIND:
+        return None
+    as_well = [each for each in found if each[0] <= min(AS_WELL * least, KIND)]
+    left, _, kind, inside = min(as_well, key=lambda each: each[1])
+    if _by_chance(quick, inside) > SIGNIFICANCE / len(tables[0]):  # Bonferroni
+        return None
+    return quick.acting([table[kind] for table in tables], kind, left)
+
+
+def _energy_beside(quick: _Quick, inside: Mask) -> float:
+    """Return the mean energy of blocks outside a kind of driving, beside the changes that explain these best."""
+    blocks = quick.blocks
+    judged = blocks.sums((quick.telling & ~inside).astype(float)) > 0.0
+    return float(_energies_beside(quick, inside)[judged].mean())
+
+
+def _by_chance(quick: _Quick, inside: Mask) -> float:
+    """Return how likely as much energy would gather by chance in a kind of driving that had come at other times."""
+    blocks, energy = quick.blocks, _energies_beside(quick, inside)
+    own = blocks.recording < quick.number
+    run, bins = blocks.recording[own], (blocks.t_s[own] / BLOCK_S).astype(np.int64)
+    lengths = np.array([bins[run == number].max(initial=-1) + 1 for number in range(quick.number)])
+    energies, masks = np.zeros((quick.number, lengths.max())), np.zeros((quick.number, lengths.max()), bool)
+    np.add.at(energies, (run, bins), energy[own])
+    np.logical_or.at(masks, (run, bins), (blocks.sums(inside.astype(float)) > 0.0)[own])
+    return regime_p(energies, masks, lengths, np.random.default_rng(0))
+
+
+def _energies_beside(quick: _Quick, inside: Mask) -> Array:
+    """Return each block's energy beside the changes that explain those outside a kind of driving best, (blocks,)."""
+    blocks, judged = quick.blocks, quick.telling & ~inside
+    scale = judged.astype(float)
+    for _ in range(ROUNDS // 2):
+        left = quick.left(scale)
+        _, sd = blocks.energy_by_moment(left, judged)
+        scale = judged * np.sqrt(weights(left / sd)) / sd
+    return np.minimum(blocks.sums(left) ** 2 / blocks.samples, CLIP)
+
+
+def _among_residuals(residuals: Residuals, rows: list[Mask]) -> Mask:
+    """Return which residuals are not compared where rows of their recordings are left out, shape (n,)."""
+    out = []
+    for run, part in zip(residuals.recordings, residuals.except_at(rows).recordings, strict=True):
+        (_, there), (_, kept) = (each.motion_index(0) for each in (run, part))
+        out.append(~kept[there])
+    return np.concatenate(out)
+
+
+def _acting(quick: _Quick) -> Mask:
+    """Return at which residuals something acts that the others do not tell, shape (n,)."""
+    blocks, telling = quick.blocks, quick.telling
     judged, scale = telling, telling.astype(float)
     for _ in range(ROUNDS):
-        columns = slopes * scale[:, None]
-        gram = columns.T @ columns + np.eye(slopes.shape[1])
-        left = errors - slopes @ np.linalg.solve(gram, (errors * scale) @ columns)
+        left = quick.left(scale)
         energy, sd = blocks.energy_by_moment(left, judged)
         acting = energy[blocks.moments] >= ACTING
         before, judged = judged, telling & ~acting

@@ -240,6 +240,13 @@ def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:
     return seen
 
 
+def steady(seen: Confirmation) -> Confirmation:
+    """Drop effects whose size differs between recordings, the most uneven first: they may be of outside physics."""
+    while (worst := most_uneven(seen.explained.problem, seen.explained.steps)) is not None:
+        seen = _refused(seen, worst, drifts=True)
+    return seen
+
+
 def standing_out(seen: Confirmation) -> Confirmation:
     """Drop effects of the colour sensor that may come from a wrong path: first those of uneven size, then weak ones.
 

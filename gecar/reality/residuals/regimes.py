@@ -18,6 +18,8 @@ AFTER_S = 0.4  # how long an event has an effect
 RESTING, SLOW_SHARE, FAST_SHARE = 0.15, 0.35, 0.7  # rad/s, and shares of the fastest shaft speed
 SMALL_DUTY, STEP = 0.25, 0.15
 TURNING, STRAIGHT = 1.5, 0.25  # rad/s
+HARD, GENTLE, TOGETHER = 0.75, 0.5, 1.5  # of the largest duty; the last of both motors together
+LEAST_CHANGE, HELD_S, THIRDS = 0.05, 1.0, 3
 HEADINGS = "heading +x", "heading +y", "heading -x", "heading -y"
 
 
@@ -37,6 +39,35 @@ def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mas
     rows = run.replayer.play(physics)[0]
     pose, placed = _pose(run, rows)
     return {**_motions(rows, run.recording.commands, lasting), **_headings(pose[:, 2], placed)}
+
+
+def kinds_of_driving(run: RecordingResiduals, largest: float) -> dict[str, Mask]:
+    """Return when commands are of one kind, as masks by what a sentence says of it, each of shape (rows,).
+
+    ``largest`` is the largest duty of all recordings.
+    """
+    duty, t = run.recording.commands, run.replayer.t
+    size, changes = np.abs(duty), np.diff(np.abs(duty), axis=0, prepend=np.abs(duty[:1]))
+    driven = size > 0.0
+    moved = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1)
+    last_change = np.maximum.accumulate(np.where(moved > 0.0, t, t[0]))
+    return {
+        "while the motors were driven opposite ways": duty[:, 0] * duty[:, 1] < 0.0,
+        "while one motor was driven alone": driven.any(axis=1) & ~driven.all(axis=1),
+        "while a motor was driven backward": (duty < 0.0).any(axis=1),
+        "while a motor was driven forward": (duty > 0.0).any(axis=1),
+        "while both motors together were driven hard": size.sum(axis=1) > TOGETHER * largest,
+        "while a motor was driven hard": size.max(axis=1) > HARD * largest,
+        "while a motor was driven gently": (driven & (size < GENTLE * largest)).any(axis=1),
+        "while a motor was not driven": ~driven.all(axis=1),
+        "just after a command changed": moved > LEAST_CHANGE,
+        "just after a duty grew": (changes > LEAST_CHANGE).any(axis=1),
+        "just after a duty fell": (changes < -LEAST_CHANGE).any(axis=1),
+        "just after a motor was reversed": _turned(duty[:, 0], 0.0) | _turned(duty[:, 1], 0.0),
+        "where commands had not changed for a second": t - last_change >= HELD_S,
+        "in the first third of recordings": t < t[-1] / THIRDS,
+        "in the last third of recordings": t > t[-1] - t[-1] / THIRDS,
+    }
 
 
 def spans_of(mask: Mask) -> list[tuple[int, int]]:
@@ -106,9 +137,9 @@ def _risen(mask: Mask) -> Mask:
     return mask & ~np.r_[False, mask[:-1]]
 
 
-def _turned(speed: Array) -> Mask:
-    """Return where a speed has changed its sign since it last was more than rest."""
-    sign = np.where(np.abs(speed) > RESTING, np.sign(speed), 0.0)
+def _turned(speed: Array, rest: float = RESTING) -> Mask:
+    """Return where a speed, or a duty, has changed its sign since it last was more than rest."""
+    sign = np.where(np.abs(speed) > rest, np.sign(speed), 0.0)
     known = np.maximum.accumulate(np.where(sign != 0.0, np.arange(len(sign)), 0))
     held = sign[known]
     return np.r_[False, held[1:] * held[:-1] < 0.0]
