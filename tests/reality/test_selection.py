@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from support.concealing import motion_of, recorded
 from support.linear_case import EV3, LinearResiduals, LinearSizes, bumps, linear, linear_problem
 
 from gecar.reality.fitting.model import Model
@@ -21,11 +22,19 @@ from gecar.reality.prove.confirmation import confirmed, dropped
 from gecar.reality.replay.channels import CHANNELS
 from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection import stepwise
-from gecar.reality.selection.acceptance import candidates, proved, stands_out, unevenness, worsens
+from gecar.reality.selection.acceptance import (
+    candidates,
+    lead,
+    proved,
+    rank,
+    stands_out,
+    unevenness,
+    worsens,
+)
 from gecar.reality.selection.alternatives import alternatives
 from gecar.reality.selection.cross_validation import judged, left_out_gains
 from gecar.reality.selection.null_distribution import largest_gains
-from gecar.reality.selection.problem import Problem
+from gecar.reality.selection.problem import Problem, problem_of
 from gecar.reality.selection.screening import candidate_steps
 from gecar.reality.selection.share import UNSEEN, Share, share_asked_for
 from gecar.reality.selection.stepwise import explain, likeliest, resumed
@@ -428,6 +437,22 @@ def test_an_effect_swapped_in_is_judged_itself(monkeypatch: pytest.MonkeyPatch) 
     found = next(step for step in steps if step.effect == VISCOUS)
     assert found.p != 0.001
     assert found.gain == pytest.approx(found.base.cost - found.model.cost)
+
+
+@pytest.mark.parametrize("radius_m", [0.1, 0.6])
+def test_grip_lost_in_a_patch_as_wide_as_the_drive_is_lost_everywhere(radius_m: float) -> None:
+    patch = {"radius_m": radius_m, "x_m": 1.1, "y_m": 0.55, "coefficient": 0.4}
+    runs = [recorded(EV3.with_effects({"slippery_patch": patch}), seed) for seed in range(3)]
+    problem = problem_of(motion_of(runs), EV3, ["slippery_patch", "tyre_friction"])
+    stage = candidate_steps(problem.under(problem.known), problem.known)
+    assert stage[0].effect == ("slippery_patch" if radius_m < 0.3 else "tyre_friction")
+
+
+def test_a_patch_gives_way_to_grip_lost_everywhere_and_to_nothing_else_as_likely() -> None:
+    step = stepwise.Step("slippery_patch", None, None, 90.0, null_95=7.0)  # type: ignore[arg-type]
+    assert lead(step, "tyre_friction") < 0.0
+    assert lead(step, "com_offset") == lead(replace(step, effect="com_offset"), "tyre_friction") == 7.0
+    assert rank(step) < rank(replace(step, effect="tyre_friction", gain=89.0))
 
 
 @pytest.mark.parametrize(("share", "kept"), [(0.8, True), (0.4, False)])

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.special import chdtri
 
 from gecar.reality.fitting.initial_values import top_speed
 from gecar.reality.fitting.model import Model, Step
@@ -36,6 +37,10 @@ BREAKAWAY = "static_friction"
 AT_BOUND = 0.01  # coordinates
 PHASES = 4  # of steps, over which a gain is averaged
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
+# What an effect at a place is where the place is everywhere, and by how much it must gain more to be told from that:
+# three parameters say where and how wide (likelihood ratio test at 5 %, Wilks, Annals of Math. Statistics 9 (1938) 60).
+EVERYWHERE = {"slippery_patch": "tyre_friction"}
+A_PLACE_COSTS = 0.5 * float(chdtri(3, 0.05))
 
 
 def whole(parameter: Parameter) -> float:  # noqa: ARG001
@@ -96,6 +101,16 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
     if problem.on_bench:
         return [step for step in enough if not stopped(step, own=True)]
     return [step for step in enough if not (stopped(step) or _worsens(problem, step))]
+
+
+def rank(step: Step) -> float:
+    """Return a step's gain, less what it costs to say where an effect at a place is."""
+    return step.gain - A_PLACE_COSTS * (step.effect in EVERYWHERE)
+
+
+def lead(found: Step, rival: str) -> float:
+    """Return by how much a rival must cost less than an effect to take its place: less than nothing, where it is it."""
+    return -A_PLACE_COSTS if EVERYWHERE.get(found.effect) == rival else found.null_95
 
 
 def competing(stage: Sequence[Step]) -> list[Step]:

@@ -15,7 +15,7 @@ from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.fitting.parameters import free as free_parameters
 from gecar.reality.optimisation.cma_es import cma_es
 from gecar.reality.optimisation.least_squares import Minimum, cost_of_each, least_squares
-from gecar.reality.selection.acceptance import competing, is_worthwhile
+from gecar.reality.selection.acceptance import competing, is_worthwhile, rank
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.thresholds import (
     COMPETING,
@@ -151,7 +151,7 @@ def _shared(estimator: Estimator, model: Model, rival: Step) -> Step:
 def _best_of_each(steps: Sequence[Step]) -> list[Step]:
     """Return each effect's best step, best first."""
     best = {step.effect: step for step in sorted(steps, key=lambda s: s.gain)}
-    return sorted(best.values(), key=lambda s: -s.gain)
+    return sorted(best.values(), key=rank, reverse=True)
 
 
 def _improved(estimator: Estimator, trial: _Trial) -> _Trial:

@@ -21,6 +21,7 @@ from gecar.reality.selection.acceptance import (
     imitates_dry_friction,
     is_material,
     is_worthwhile,
+    lead,
     most_uneven,
     proved,
     stands_out,
@@ -478,14 +479,14 @@ def _judged(problem: Problem, model: Model, rest: Sequence[str], effect: str) ->
 
 
 def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequence[Step]) -> Step | None:
-    """Return the step of the first rival that gains more in an effect's place, and proves itself."""
+    """Return the step of the first rival that proves itself in an effect's place, gains more or says less of where."""
     estimator = problem.estimator
     for other in rivals:
         if other.effect in found.model.effects:
             continue
         values = {**found.model.values, **other.model.values}
         swapped = estimator.fit((*rest, other.effect), values)
-        if swapped.cost < found.model.cost - found.null_95:
+        if swapped.cost < found.model.cost - lead(found, other.effect):
             step = judged(problem, step_of(estimator, other.effect, found.base, swapped))
             if (
                 proved(step)
