@@ -35,7 +35,7 @@ from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import ABOUT_M, middle, strongest_place, with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
-from gecar.reality.locate.moments import kind_of_driving, moments
+from gecar.reality.locate.moments import Acting, kind_of_driving, moments
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
@@ -368,8 +368,8 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     """Explain how the robot moved: by the effects that were seen, by effects and laws, or by laws alone.
 
     Clocks of the camera that were fitted before the laws were known have taken up a part of these: then all begins
-    anew. What is left may be at one place on the floor, or else one instrument may be wrong, or something acts in one
-    kind of driving, or now and then.
+    anew. What is left may be at one place on the floor, or in one kind of driving, or else one instrument may be wrong,
+    or something acts now and then.
     """
     motion = _motion(context, seen, held)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
@@ -385,9 +385,12 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     elsewhere = _explained_elsewhere(context, found.explained, found.candidates, problem.residuals, held)
     if elsewhere or not motion.explained.unexplained:
         return elsewhere or found
+    found = _explained_at_other_times(context, found, kind_of_driving, problem.residuals, held)
+    if found.left_out:
+        return found
     without = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
     in_part = next(filter(None, without), None)
-    return in_part or _explained_at_other_times(context, found, problem.residuals, held)
+    return in_part or _explained_at_other_times(context, found, moments, problem.residuals, held)
 
 
 def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
@@ -426,32 +429,34 @@ def _explained_elsewhere(
     return replace(motion, explained=replace(motion.explained, spot=spot), left_out=note_on_place(spot))
 
 
-def _explained_at_other_times(context: _Context, found: _Stage, fitted: Residuals, held: Residuals) -> _Stage:
-    """Explain motion without the kind of driving, or else the moments, in which something unknown acts.
+def _explained_at_other_times(
+    context: _Context,
+    found: _Stage,
+    told: Callable[[Problem, Model, Residuals], Acting | None],
+    fitted: Residuals,
+    held: Residuals,
+) -> _Stage:
+    """Explain motion without the kind of driving, or the moments, in which something unknown acts, as it is ``told``.
 
     It stays as it is if there are hardly any, or so many that too little is left, or if no effect explains the others.
     """
     problem, taken = found.explained.problem, found.explained.taken
     if problem.on_bench:
         return found
-    beside = problem.with_its_camera(held, taken.physics)
-    for told in (kind_of_driving, moments):
-        acting = told(problem, taken, beside)
-        if acting is None:
-            continue
-        alone, others = fitted.except_at(acting.fitted), held.except_at(acting.held)
-        share = len(alone.index.t_s) / max(len(fitted.index.t_s), 1)
-        if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
-            continue
-        when = acting.kind or "at some moments"
-        context.tell(f"something acts {when}: once more without what happened then")
-        motion = _explained_in_part(context, alone, others, fitted)
-        if motion is not None:
-            note = note_on_kind(acting.kind, acting.left, True) if acting.kind else note_on_moments(alone)
-            return replace(motion, left_out=note)
-        if acting.kind:
-            found = replace(found, acts=note_on_kind(acting.kind, acting.left, False))
-    return found
+    acting = told(problem, taken, problem.with_its_camera(held, taken.physics))
+    if acting is None:
+        return found
+    alone, others = fitted.except_at(acting.fitted), held.except_at(acting.held)
+    share = len(alone.index.t_s) / max(len(fitted.index.t_s), 1)
+    if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
+        return found
+    context.tell(f"something acts {acting.kind or 'at some moments'}: once more without what happened then")
+    motion = _explained_in_part(context, alone, others, fitted)
+    if not acting.kind:
+        return replace(motion, left_out=note_on_moments(alone)) if motion else found
+    if motion is None:
+        return replace(found, acts=note_on_kind(acting.kind, acting.left, False))
+    return replace(motion, left_out=note_on_kind(acting.kind, acting.left, True))
 
 
 def _explained_in_part(

@@ -58,6 +58,8 @@ def title(verdict: Verdict) -> str:
     """Say in one sentence what is missing; if the test failed, say that first."""
     if verdict.judgement.failed:
         found = " and ".join([*([_names(verdict)] if verdict.effects else []), *_laws(verdict)])
+        if verdict.verdict == "missing_and_unexplained":
+            return f"{FAILS} Something unknown acts in these, too. Found beside it: {found}."
         return f"{FAILS} Found, but not reliable: {found}."
     return _headline(verdict)
 

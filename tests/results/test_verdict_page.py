@@ -159,6 +159,9 @@ def test_a_proof_that_fails_is_said_first() -> None:
     screen = first_screen(verdict, ())
     assert html.escape(FAILS) in re.search("<h1>(.*?)</h1>", screen).group(1)  # type: ignore[union-attr]
     assert "Missing in the simulation" not in screen
+    assert "Found, but not reliable" in words(verdict)[0]
+    beside = replace(verdict, verdict="missing_and_unexplained")
+    assert "Something unknown acts in these, too" in words(beside)[0]
 
 
 def test_a_headline_names_three_causes_at_most() -> None:
