@@ -859,6 +859,8 @@ def test_sums_are_taken_apart_and_put_together():
          "a pull toward (1.21, 0.58) growing with distance: a spring"),
         ({"port": "rolling_radius", "law": "c1 * sin(k1 * angle) + c2 * cos(k2 * angle)", "c1": 0.1, "c2": 0.1,
           "k1": 1.0, "k2": 1.0}, "a wheel off its centre by 4.0 mm"),
+        ({"port": "tyre_grip", "law": "c1 * sin(k1 * angle)", "c1": 0.04, "k1": 2.0, "side": "left"},
+         "twice per turn: a share of the tyre's grip that varies with the shaft's angle, on the left wheel alone"),
         ({"port": "motor_torque", "law": "c1 * angle", "c1": -0.01, "side": "left"},
          "a spring that winds up as the wheel turns, on the left wheel alone"),
         ({"port": "motor_torque", "law": "c1 * store * command", "c1": -0.1, "store": "draw", "store_s": 15.0},

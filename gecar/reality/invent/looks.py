@@ -183,10 +183,9 @@ def _once_per_turn(term: Term) -> str:
         return f"once per wheel turn: a wheel off its centre by {1e3 * size * 0.028:.1f} mm on 28 mm"
     if term.port == "rolling_radius" and cycles == [2]:
         return "twice per wheel turn: an oval wheel"
-    what = {"encoder_reading": "an encoder off its centre"}.get(
-        term.port, "torque that varies with the shaft's angle"
-    )
-    return f"{often} per turn: {what}"
+    if term.port == "encoder_reading":
+        return f"{often} per turn: an encoder off its centre"
+    return f"{often} per turn: {BY_PORT[term.port].title} that varies with the shaft's angle"
 
 
 def _late(term: Term) -> str:
