@@ -34,7 +34,7 @@ Mask = npt.NDArray[np.bool_]
 ROUNDS = 8
 QUICK_S = 0.1  # memory of the replays that tell when something acts: what happened shall not last
 ACTING = 4.0  # times a typical moment's energy: one of a thousand is as large where there is noise alone
-KIND = 0.7  # of the energy may be left without a kind of driving
+KIND = 0.7  # of the energy may be left without a kind of driving; right kinds left 0.11 to 0.67 in development cases
 AS_WELL = 1.1  # times the least energy left: of kinds that tell as well the one that leaves most counts
 MOST_LEFT_OUT = 0.5  # of all residuals, with a kind of driving
 CLIP = 100.0  # energy of a block in units of the sensors' noise: what is larger is not told apart
@@ -162,7 +162,7 @@ def _by_chance(quick: _Quick, inside: Mask) -> float:
     blocks, energy = quick.blocks, _energies_beside(quick, inside)
     own = blocks.recording < quick.number
     run, bins = blocks.recording[own], (blocks.t_s[own] / BLOCK_S).astype(np.int64)
-    lengths = np.array([bins[run == number].max(initial=-1) + 1 for number in range(quick.number)])
+    lengths = np.array([bins[run == number].max(initial=0) + 1 for number in range(quick.number)])
     energies, masks = np.zeros((quick.number, lengths.max())), np.zeros((quick.number, lengths.max()), bool)
     np.add.at(energies, (run, bins), energy[own])
     np.logical_or.at(masks, (run, bins), (blocks.sums(inside.astype(float)) > 0.0)[own])
