@@ -749,6 +749,17 @@ def test_a_law_is_told_in_words_numbers_and_pictures(tmp_path):
         assert is_whole(laws_figure(each))
 
 
+def test_a_law_that_differs_by_side_alone_is_drawn_as_it_is_on_the_right():
+    verdict = verdict_on(SAG)
+    (law,) = verdict.invented
+    span = replace(law.parameters["c1"], value=2e-4, low=1e-4, high=3e-4)
+    apart = Term(port="motor_torque", law="c1 * side", c1=2e-4)
+    law = replace(law, term=apart, range={"side": (-1.0, 1.0)}, parameters={"c1": span})
+    figure = laws_figure(replace(verdict, invented=(law,)))
+    assert is_whole(figure)
+    assert "the opposite on the left" in figure.axes[0].get_xlabel()
+
+
 def test_a_law_of_the_place_is_drawn_on_the_floor():
     verdict = verdict_on(*TILT)
     told = Told((), ())
@@ -859,6 +870,8 @@ def test_sums_are_taken_apart_and_put_together():
          "a pull toward (1.21, 0.58) growing with distance: a spring"),
         ({"port": "rolling_radius", "law": "c1 * sin(k1 * angle) + c2 * cos(k2 * angle)", "c1": 0.1, "c2": 0.1,
           "k1": 1.0, "k2": 1.0}, "a wheel off its centre by 4.0 mm"),
+        ({"port": "motor_torque", "law": "c1 * side", "c1": 1e-4},
+         "a torque on the motor's shaft, opposite on the two sides"),
         ({"port": "tyre_grip", "law": "c1 * sin(k1 * angle)", "c1": 0.04, "k1": 2.0, "side": "left"},
          "twice per turn: a share of the tyre's grip that varies with the shaft's angle, on the left wheel alone"),
         ({"port": "motor_torque", "law": "c1 * angle", "c1": -0.01, "side": "left"},

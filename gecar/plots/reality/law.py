@@ -25,7 +25,7 @@ POINTS = 400
 CURVE_IN, ALWAYS_IN = 2.7, 1.2
 DRAWS = 200  # of constants within their intervals, for the band
 _VARIABLES = {variable.id: variable for variable in VARIABLES}
-_NOWHERE = {"time": np.zeros(())}
+_NOWHERE = {"time": np.zeros(()), "side": np.ones(())}  # a law that is opposite on both sides: on the right
 _ANGLES = ("angle", "other_angle", "heading")
 _OF_PLACE = frozenset(("x", "y", "distance"))
 MAP_IN = 4.3
@@ -117,7 +117,8 @@ def _draw_value(axes: Axes, law: Invented) -> None:
     low, high = sorted(float(law.term.with_constants(_ends(law, k)).value(_NOWHERE)) for k in (0, 1))
     axes.errorbar([value], [0.0], xerr=[[value - low], [high - value]], fmt="o", color=BLUE, capsize=4)
     axes.axvline(0.0, color=INK, linewidth=0.6)
-    axes.set(yticks=[], ylim=(-1.0, 1.0), xlabel=f"{_what(law)}, always the same")
+    always = "on the right wheel; the opposite on the left" if "side" in law.range else "always the same"
+    axes.set(yticks=[], ylim=(-1.0, 1.0), xlabel=f"{_what(law)}, {always}")
     axes.margins(x=0.1)
 
 

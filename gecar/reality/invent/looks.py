@@ -258,5 +258,6 @@ def _named(term: Term) -> str:
 
 def _described(term: Term) -> str:
     depends = [_TITLES[name] for name in term.parsed.variables if name != "side"]
-    on = f" that depends on {' and '.join(depends)}" if depends else ", always the same"
+    always = ", opposite on the two sides" if "side" in term.parsed.variables else ", always the same"
+    on = f" that depends on {' and '.join(depends)}" if depends else always
     return f"{BY_PORT[term.port].title}{on}{_where(term)}"
