@@ -436,9 +436,10 @@ def _explained_at_other_times(
     fitted: Residuals,
     held: Residuals,
 ) -> _Stage:
-    """Explain motion without the kind of driving, or the moments, in which something unknown acts, as it is ``told``.
+    """Explain motion without the times at which something unknown acts, which ``told`` finds.
 
-    It stays as it is if there are hardly any, or so many that too little is left, or if no effect explains the others.
+    The stage stays as it is if there are hardly any, or so many that too little is left, or if no effect explains the
+    rest.
     """
     problem, taken = found.explained.problem, found.explained.taken
     if problem.on_bench:

@@ -13,11 +13,12 @@ from gecar.reality.discovery import discover
 from gecar.reality.locate.moments import KIND, kind_of_driving, moments
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.selection.problem import problem_of
+from gecar.reality.verdict import Verdict
 from gecar.world.effects import CATALOGUE
 from gecar.world.robot import Robot
 
 LOST_S = 0.4
-TURNED_BY = 0.75  # of what the log claims
+WEAKENED = 0.75  # of what the log claims
 OVER_S = 0.8  # after which a replay with a memory of a second has forgotten what happened
 
 
@@ -32,12 +33,21 @@ def losing(robot: Robot, seed: int) -> Recording:
 def weak_in_turns(robot: Robot, seed: int) -> Recording:
     """Return a drive whose motors get less than the log claims while they are driven opposite ways."""
     run = recorded(robot, seed, seconds=12.0)
-    claimed = np.where(_opposite(run), 1.0 / TURNED_BY, 1.0)
+    claimed = np.where(_opposite(run), 1.0 / WEAKENED, 1.0)
     return replace(run, left_duty=run.left_duty * claimed, right_duty=run.right_duty * claimed)
 
 
 def _opposite(run: Recording) -> npt.NDArray[np.bool_]:
     return run.left_duty * run.right_duty < 0.0
+
+
+def named_alone_if_any(verdict: Verdict, size: float) -> None:
+    """Assert that wheels that differ by a size are named alone, with it in their interval, and that more is left."""
+    assert {found.id for found in verdict.effects} == ({"wheel_radius_difference"} if size else set())
+    assert verdict.verdict == ("missing_and_unexplained" if size else "unexplained")
+    for found in verdict.effects:
+        span = found.parameters["right_minus_left"]
+        assert span.low <= size <= span.high
 
 
 def _lost(run: Recording, seed: int, after_s: float = 0.0) -> npt.NDArray[np.bool_]:
@@ -70,13 +80,9 @@ def test_noise_alone_makes_no_moment() -> None:
 def test_an_effect_is_named_beside_lost_commands_and_none_where_there_is_none(size: float) -> None:
     robot = EV3.with_effects({"wheel_radius_difference": {"right_minus_left": size}})
     verdict = discover(Case("made", tuple(losing(robot, seed) for seed in range(4))))
-    assert {found.id for found in verdict.effects} == ({"wheel_radius_difference"} if size else set())
-    assert verdict.verdict == ("missing_and_unexplained" if size else "unexplained")
+    named_alone_if_any(verdict, size)
     (told,) = [note for note in verdict.notes if note.startswith("At some moments")] or [""]
     assert ("run_1 at 2." in told) == bool(size)
-    for found in verdict.effects:
-        span = found.parameters["right_minus_left"]
-        assert span.low <= size <= span.high
 
 
 def test_the_kind_of_driving_in_which_motors_are_weak_is_told_beside_an_effect_of_any_size() -> None:
@@ -104,10 +110,6 @@ def test_noise_alone_or_what_acts_in_all_driving_has_no_kind() -> None:
 def test_an_effect_is_named_beside_motors_that_are_weak_in_turns(size: float) -> None:
     robot = EV3.with_effects({"wheel_radius_difference": {"right_minus_left": size}})
     verdict = discover(Case("made", tuple(weak_in_turns(robot, seed) for seed in range(4))))
-    assert {found.id for found in verdict.effects} == ({"wheel_radius_difference"} if size else set())
-    assert verdict.verdict == ("missing_and_unexplained" if size else "unexplained")
+    named_alone_if_any(verdict, size)
     (told,) = [note for note in verdict.notes if "mainly while the motors were driven opposite ways" in note]
     assert ("was left out" in told) == bool(size)
-    for found in verdict.effects:
-        span = found.parameters["right_minus_left"]
-        assert span.low <= size <= span.high

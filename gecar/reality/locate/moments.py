@@ -41,7 +41,7 @@ CLIP = 100.0  # energy of a block in units of the sensors' noise: what is larger
 
 
 class Acting(NamedTuple):
-    """When something acts.
+    """The rows of recordings at which something unknown acts.
 
     Attributes
     ----------
@@ -95,14 +95,14 @@ class _Quick:
         return cls(residuals, problem.estimator.blocks, number, errors, slopes, telling)
 
     def left(self, scale: Array) -> Array:
-        """Return what the changes leave that explain the residuals best, each scaled, shape (n,)."""
+        """Fit the changes to residuals times a scale, shape (n,), and return what they leave, unscaled, (n,)."""
         columns = self.slopes * scale[:, None]
         gram = columns.T @ columns + np.eye(self.slopes.shape[1])
         out: Array = self.errors - self.slopes @ np.linalg.solve(gram, (self.errors * scale) @ columns)
         return out
 
     def acting(self, rows: list[Mask], kind: str = "", left: float = 1.0) -> Acting:
-        """Return when something acts, by rows of all recordings."""
+        """Return when something acts, given rows of all recordings."""
         return Acting(kind, rows[: self.number], rows[self.number :], left)
 
 
@@ -126,7 +126,7 @@ def moments(problem: Problem, model: Model, held: Residuals) -> Acting:
 
 
 def kind_of_driving(problem: Problem, model: Model, held: Residuals) -> Acting | None:
-    """Return the kind of driving in which something acts; None if no kind tells; parameters as for `moments`.
+    """Return the kind of driving in which something acts, or None; parameters as for `moments`.
 
     Without it, changes of a model's constants must leave far less energy of all the rest than of everything.
     """
@@ -134,54 +134,76 @@ def kind_of_driving(problem: Problem, model: Model, held: Residuals) -> Acting |
     runs = quick.residuals.recordings
     largest = max(float(np.abs(run.recording.commands).max()) for run in runs)
     tables = [kinds_of_driving(run, largest) for run in runs]
-    whole, found = _energy_beside(quick, np.zeros(len(quick.errors), bool)), []
-    for kind in tables[0]:
-        inside = _among_residuals(quick.residuals, [table[kind] for table in tables])
-        share = float(inside[quick.telling].mean())
-        if 0.0 < share <= MOST_LEFT_OUT:
-            found.append((_energy_beside(quick, inside) / whole, share, kind, inside))
-    least = min((left for left, *_ in found), default=np.inf)
+    whole = _beside(quick, "", np.zeros(len(quick.errors), bool)).energy
+    inside = {name: _without(quick.residuals, [table[name] for table in tables]) for name in tables[0]}
+    kinds = [
+        _beside(quick, name, mask)
+        for name, mask in inside.items()
+        if 0.0 < mask[quick.telling].mean() <= MOST_LEFT_OUT
+    ]
+    least = min((kind.energy for kind in kinds), default=np.inf) / whole
     if least > KIND:
         return None
-    as_well = [each for each in found if each[0] <= min(AS_WELL * least, KIND)]
-    left, _, kind, inside = min(as_well, key=lambda each: each[1])
-    if _by_chance(quick, inside) > SIGNIFICANCE / len(tables[0]):  # Bonferroni
+    as_well = [kind for kind in kinds if kind.energy / whole <= min(AS_WELL * least, KIND)]
+    found = min(as_well, key=lambda kind: kind.share)
+    if _by_chance(quick, found) > SIGNIFICANCE / len(tables[0]):  # Bonferroni
         return None
-    return quick.acting([table[kind] for table in tables], kind, left)
+    return quick.acting([table[found.name] for table in tables], found.name, found.energy / whole)
 
 
-def _energy_beside(quick: _Quick, inside: Mask) -> float:
-    """Return the mean energy of blocks outside a kind of driving, beside the changes that explain these best."""
-    blocks = quick.blocks
-    judged = blocks.sums((quick.telling & ~inside).astype(float)) > 0.0
-    return float(_energies_beside(quick, inside)[judged].mean())
+class _Kind(NamedTuple):
+    """A kind of driving, and what the changes leave that explain all other driving best.
+
+    Attributes
+    ----------
+    name, inside
+        As a note says it, and which residuals would drop out with it, shape (n,).
+    share
+        Of the residuals that tell the changes, which would drop out.
+    blocks, energy
+        The energy of each block, shape (blocks,), and the mean over the blocks of all other driving.
+    """
+
+    name: str
+    inside: Mask
+    share: float
+    blocks: Array
+    energy: float
 
 
-def _by_chance(quick: _Quick, inside: Mask) -> float:
-    """Return how likely as much energy would gather by chance in a kind of driving that had come at other times."""
-    blocks, energy = quick.blocks, _energies_beside(quick, inside)
-    own = blocks.recording < quick.number
-    run, bins = blocks.recording[own], (blocks.t_s[own] / BLOCK_S).astype(np.int64)
-    lengths = np.array([bins[run == number].max(initial=0) + 1 for number in range(quick.number)])
-    energies, masks = np.zeros((quick.number, lengths.max())), np.zeros((quick.number, lengths.max()), bool)
-    np.add.at(energies, (run, bins), energy[own])
-    np.logical_or.at(masks, (run, bins), (blocks.sums(inside.astype(float)) > 0.0)[own])
-    return regime_p(energies, masks, lengths, np.random.default_rng(0))
-
-
-def _energies_beside(quick: _Quick, inside: Mask) -> Array:
-    """Return each block's energy beside the changes that explain those outside a kind of driving best, (blocks,)."""
+def _beside(quick: _Quick, name: str, inside: Mask) -> _Kind:
+    """Fit the changes to all driving but one kind."""
     blocks, judged = quick.blocks, quick.telling & ~inside
     scale = judged.astype(float)
     for _ in range(ROUNDS // 2):
         left = quick.left(scale)
         _, sd = blocks.energy_by_moment(left, judged)
-        scale = judged * np.sqrt(weights(left / sd)) / sd
-    return np.minimum(blocks.sums(left) ** 2 / blocks.samples, CLIP)
+        scale = _scale(judged, left, sd)
+    energy = np.minimum(blocks.sums(left) ** 2 / blocks.samples, CLIP)
+    mean = float(energy[blocks.sums(judged.astype(float)) > 0.0].mean())
+    return _Kind(name, inside, float(inside[quick.telling].mean()), energy, mean)
 
 
-def _among_residuals(residuals: Residuals, rows: list[Mask]) -> Mask:
-    """Return which residuals are not compared where rows of their recordings are left out, shape (n,)."""
+def _by_chance(quick: _Quick, kind: _Kind) -> float:
+    """Return the p-value of the energy in a kind of driving: how often as much is there where its times are shifted."""
+    blocks = quick.blocks
+    own = blocks.recording < quick.number
+    run, bins = blocks.recording[own], (blocks.t_s[own] / BLOCK_S).astype(np.int64)
+    lengths = np.array([bins[run == number].max(initial=0) + 1 for number in range(quick.number)])
+    energies, masks = np.zeros((quick.number, lengths.max())), np.zeros((quick.number, lengths.max()), bool)
+    np.add.at(energies, (run, bins), kind.blocks[own])
+    np.logical_or.at(masks, (run, bins), (blocks.sums(kind.inside.astype(float)) > 0.0)[own])
+    return regime_p(energies, masks, lengths, np.random.default_rng(0))
+
+
+def _scale(judged: Mask, left: Array, sd: Array) -> Array:
+    """Return what scales residuals of a standard deviation in the next fit: outliers count less, others not at all."""
+    out: Array = judged * np.sqrt(weights(left / sd)) / sd
+    return out
+
+
+def _without(residuals: Residuals, rows: list[Mask]) -> Mask:
+    """Return which residuals drop out if some rows of their recordings are left out, shape (n,)."""
     out = []
     for run, part in zip(residuals.recordings, residuals.except_at(rows).recordings, strict=True):
         (_, there), (_, kept) = (each.motion_index(0) for each in (run, part))
@@ -190,7 +212,7 @@ def _among_residuals(residuals: Residuals, rows: list[Mask]) -> Mask:
 
 
 def _acting(quick: _Quick) -> Mask:
-    """Return at which residuals something acts that the others do not tell, shape (n,)."""
+    """Return which residuals lie in moments at which something acts, shape (n,)."""
     blocks, telling = quick.blocks, quick.telling
     judged, scale = telling, telling.astype(float)
     for _ in range(ROUNDS):
@@ -198,7 +220,7 @@ def _acting(quick: _Quick) -> Mask:
         energy, sd = blocks.energy_by_moment(left, judged)
         acting = energy[blocks.moments] >= ACTING
         before, judged = judged, telling & ~acting
-        scale = judged * np.sqrt(weights(left / sd)) / sd
+        scale = _scale(judged, left, sd)
         if np.array_equal(judged, before):
             break
     return acting

@@ -42,14 +42,14 @@ def motions(run: RecordingResiduals, physics: npt.NDArray[Any]) -> dict[str, Mas
 
 
 def kinds_of_driving(run: RecordingResiduals, largest: float) -> dict[str, Mask]:
-    """Return when commands are of one kind, as masks by what a sentence says of it, each of shape (rows,).
+    """Return at which rows commands are of a kind, as masks by the words that a note has for it, each of shape (rows,).
 
     ``largest`` is the largest duty of all recordings.
     """
     duty, t = run.recording.commands, run.replayer.t
     size, changes = np.abs(duty), np.diff(np.abs(duty), axis=0, prepend=np.abs(duty[:1]))
     driven = size > 0.0
-    moved = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1)
+    moved = _changes(duty)
     last_change = np.maximum.accumulate(np.where(moved > 0.0, t, t[0]))
     return {
         "while the motors were driven opposite ways": duty[:, 0] * duty[:, 1] < 0.0,
@@ -112,7 +112,7 @@ def _motions(rows: Array, duty: Array, lasting: int) -> dict[str, Mask]:
     fastest = max(float(np.abs(rows[:, [LEFT_SPEED, RIGHT_SPEED]]).max()), 1e-9)
     speed = np.maximum(np.abs(left), np.abs(right))
     moving = speed > RESTING
-    stepped = np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1) > STEP
+    stepped = _changes(duty) > STEP
     return {
         "from rest": _after(_risen(moving), lasting),
         "reversal": _after(_turned(left) | _turned(right), lasting),
@@ -127,6 +127,11 @@ def _motions(rows: Array, duty: Array, lasting: int) -> dict[str, Mask]:
         "forward": ahead > 0.02,
         "backward": ahead < -0.02,
     }
+
+
+def _changes(duty: Array) -> Array:
+    """Return by how much the command of either motor, whichever more, changed at every row, shape (rows,)."""
+    return np.asarray(np.abs(np.diff(duty, axis=0, prepend=duty[:1])).max(axis=1))
 
 
 def _after(event: Mask, length: int) -> Mask:

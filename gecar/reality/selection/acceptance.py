@@ -109,7 +109,7 @@ def rank(step: Step) -> float:
 
 
 def lead(found: Step, rival: str) -> float:
-    """Return by how much a rival must cost less than an effect to take its place: less than nothing, where it is it."""
+    """Return by how much less a rival must cost to take an effect's place; by `EVERYWHERE` it may cost more."""
     return -A_PLACE_COSTS if EVERYWHERE.get(found.effect) == rival else found.null_95
 
 
