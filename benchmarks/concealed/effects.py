@@ -145,6 +145,18 @@ def _slippery_patch(rng: Rng, least: float) -> Drawn:
     return Drawn({"patch": (x, y, radius, grip)}, {**parameters, "coefficient": value(grip, "-")})
 
 
+def _point_drag(rng: Rng, least: float) -> Drawn:
+    """Draw what hangs down as the kind `dragging_brush` does, which came first: beside the robot's middle."""
+    force, ahead = strength(rng, 0.05, 0.5, least), float(rng.uniform(-0.09, 0.09))
+    left = _sign(rng) * float(rng.uniform(0.04, 0.09))
+    parameters = {
+        "force_n": value(force, "N"),
+        "left_m": value(left, "m"),
+        "off_axle_m": value(abs(ahead), "m"),
+    }
+    return Drawn({"brush": (force, ahead, left)}, parameters)
+
+
 def _floor_tilt(rng: Rng, least: float) -> Drawn:
     size, way = strength(rng, 0.008, 0.10, least), rng.uniform(-math.pi, math.pi)
     x, y = float(size * math.cos(way)), float(size * math.sin(way))
@@ -193,7 +205,7 @@ def _line_shift(rng: Rng, least: float) -> Drawn:
 
 # More than one number says how large they are, where a limit states one.
 SEVERAL = (
-    "dead_band", "floor_tilt", "friction_asymmetry", "line_shift", "sensor_gain", "sensor_position",
+    "dead_band", "floor_tilt", "friction_asymmetry", "line_shift", "point_drag", "sensor_gain", "sensor_position",
     "slippery_patch", "static_friction", "torque_ripple",
 )  # fmt: skip
 
@@ -260,6 +272,7 @@ EFFECTS: dict[str, Effect] = {
     "tyre_friction": Effect(_tyre_friction, "grip", _POSE),
     "slippery_patch": Effect(_slippery_patch, "grip", _POSE),
     "caster_drag": Effect(_added("caster_friction", "coefficient", "-", 0.07, 0.8), "dry"),
+    "point_drag": Effect(_point_drag, "dry"),
     "rolling_resistance": Effect(_added("rolling_resistance", "coefficient", "-", 0.015, 0.12), "dry"),
     "floor_tilt": Effect(_floor_tilt, "tilt"),
     "load_transfer": Effect(_load_transfer, "grip", _POSE),
@@ -276,4 +289,4 @@ EFFECTS: dict[str, Effect] = {
     "pose_delay": Effect(_added("pose_delay", "time_s", "s", 0.008, 0.15), "pose time", _POSE),
 }
 # Those that plans draw from: had what came later joined the rest, no seed would draw what it drew before.
-PLANNED = tuple(name for name in EFFECTS if name != "yaw_inertia")
+PLANNED = tuple(name for name in EFFECTS if name not in ("yaw_inertia", "point_drag"))

@@ -448,10 +448,24 @@ def test_grip_lost_in_a_patch_as_wide_as_the_drive_is_lost_everywhere(radius_m: 
     assert stage[0].effect == ("slippery_patch" if radius_m < 0.3 else "tyre_friction")
 
 
+@pytest.mark.parametrize("effect", ["point_drag", "caster_drag"])
+def test_what_drags_at_the_caster_is_the_caster(effect: str) -> None:
+    of = {
+        "point_drag": {"force_n": 0.3, "left_m": 0.06, "off_axle_m": 0.02},
+        "caster_drag": {"coefficient": 0.15},
+    }
+    runs = [recorded(EV3.with_effects({effect: of[effect]}), seed) for seed in range(3)]
+    problem = problem_of(motion_of(runs), EV3, ["point_drag", "caster_drag", "motor_gain_asymmetry"])
+    stage = candidate_steps(problem.under(problem.known), problem.known)
+    assert stage[0].effect == effect
+    assert stage[0].model.values[effect] == pytest.approx(of[effect], rel=0.1)
+
+
 def test_a_patch_gives_way_to_grip_lost_everywhere_and_to_nothing_else_as_likely() -> None:
     step = stepwise.Step("slippery_patch", None, None, 90.0, null_95=7.0)  # type: ignore[arg-type]
     assert lead(step, "tyre_friction") < 0.0
     assert lead(step, "com_offset") == lead(replace(step, effect="com_offset"), "tyre_friction") == 7.0
+    assert lead(step, "tyre_friction") < lead(replace(step, effect="point_drag"), "caster_drag") < 0.0
     assert rank(step) < rank(replace(step, effect="tyre_friction", gain=89.0))
 
 

@@ -20,7 +20,7 @@ WEIGHT = BODY.mass * GRAVITY
 CASTER = WEIGHT * BODY.com_ahead / BODY.caster_ahead
 DT = 0.002
 ICE = NOMINAL.model_copy(update={"tyre": NOMINAL.tyre.model_copy(update={"friction": 0.0})})
-SHAPED = ("static_friction", "dead_band", "torque_ripple", "slippery_patch")
+SHAPED = ("static_friction", "dead_band", "torque_ripple", "slippery_patch", "point_drag")
 
 
 def with_effect(effect: str, robot: Robot = NOMINAL, **values: float) -> Robot:
@@ -379,6 +379,47 @@ def test_a_dragging_caster_resists_turning():
     side = 0.4 * CASTER * abs(BODY.caster_ahead) / BODY.track_width * BODY.wheel_radius
     expected = steady(0.3, torque=FRICTION + side) / steady(0.3)
     assert drags / free == pytest.approx(expected, rel=0.02)
+
+
+def test_what_drags_takes_its_force_off_the_wheels():
+    robot = with_effect("point_drag", force_n=0.4, off_axle_m=0.05)
+    drag = 0.5 * 0.4 * BODY.wheel_radius
+    assert settled(robot) == pytest.approx(steady(0.6, torque=FRICTION + drag), rel=1e-6)
+
+
+@pytest.mark.parametrize("left", [0.06, -0.06])
+def test_what_drags_aside_loads_the_wheel_on_its_side_and_turns_the_robot_there(left):
+    robot = with_effect("point_drag", force_n=0.4, left_m=left)
+    last = run(hold(0.6, 0.6, 2.0), robot)[-1]
+    share = 0.5 + left / BODY.track_width
+    torques = FRICTION + 0.4 * BODY.wheel_radius * np.array([share, 1.0 - share])
+    expected = [steady(0.6, torque=torque) for torque in torques]
+    assert [last["left_speed"], last["right_speed"]] == pytest.approx(expected, rel=2e-3)
+    assert last["yaw_rate"] * left > 0.0
+
+
+def test_what_drags_resists_turning_by_its_distance_from_the_axle():
+    free, drags = (
+        run(hold(-0.3, 0.3, 3.0), r)[-1]["yaw_rate"]
+        for r in (NOMINAL, with_effect("point_drag", force_n=0.4, left_m=0.05, off_axle_m=0.06))
+    )
+    side = 0.4 * math.hypot(0.06, 0.05) / BODY.track_width * BODY.wheel_radius
+    assert drags / free == pytest.approx(steady(0.3, torque=FRICTION + side) / steady(0.3), rel=0.02)
+
+
+def test_what_drags_aside_slows_a_body_on_ice_and_turns_it():
+    robot = with_effect("point_drag", ICE, force_n=0.1, left_m=0.05)
+    last = run(hold(0.0, 0.0, 0.05), robot.with_effects({"floor_tilt": {"x_rad": 0.2}}))[-1]
+    assert last["vx"] == pytest.approx(0.05 * (WEIGHT * math.sin(0.2) - 0.1) / BODY.mass, rel=1e-3)
+    assert last["yaw_rate"] == pytest.approx(0.05 * 0.1 * 0.05 / BODY.yaw_inertia, rel=3e-2)
+
+
+@pytest.mark.parametrize("tilt", [0.8, 0.95])
+def test_what_drags_holds_a_robot_on_ice_up_to_its_force(tilt):
+    robot = with_effect("point_drag", ICE, force_n=0.3)
+    slope = math.asin(tilt * 0.3 / WEIGHT)
+    last = run(hold(0.0, 0.0, 0.3), robot.with_effects({"floor_tilt": {"x_rad": -slope}}))[-1]
+    assert abs(last["vx"]) < 1e-5  # three sweeps leave a thousandth of what a step of gravity gives
 
 
 def test_rolling_resistance_takes_its_torque_off_the_wheels():

@@ -53,6 +53,7 @@ SHOWN: Mapping[str, Mapping[str, float]] = {
     "dead_band": {"duty_pct": 15.0},
     "torque_ripple": {"amplitude_nm": 0.04, "cycles_per_rev": 4.0},
     "slippery_patch": {"radius_m": 0.2, "x_m": 1.2, "y_m": 0.85, "coefficient": 0.03},
+    "point_drag": {"force_n": 0.4, "left_m": 0.06, "off_axle_m": 0.02},
     "tyre_friction": {"coefficient": 0.1},
     "load_transfer": {"height_m": 0.12},
     "speed_limit": {"speed_rad_s": 7.0},

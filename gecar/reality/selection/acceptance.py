@@ -37,10 +37,10 @@ BREAKAWAY = "static_friction"
 AT_BOUND = 0.01  # coordinates
 PHASES = 4  # of steps, over which a gain is averaged
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
-# What an effect at a place is where the place is everywhere, and by how much it must gain more to be told from that:
-# three parameters say where and how wide (likelihood ratio test at 5 %, Wilks, Annals of Math. Statistics 9 (1938) 60).
-EVERYWHERE = {"slippery_patch": "tyre_friction"}
-A_PLACE_COSTS = 0.5 * float(chdtri(3, 0.05))
+# What an effect is that does not say where it acts, of one that does: grip lost everywhere, a caster that drags. The
+# latter must gain more by what its so many parameters of the place gain by chance (likelihood ratio test at 5 %, Wilks,
+# Annals of Math. Statistics 9 (1938) 60).
+UNPLACED = {"slippery_patch": ("tyre_friction", 3), "point_drag": ("caster_drag", 2)}
 
 
 def whole(parameter: Parameter) -> float:  # noqa: ARG001
@@ -104,13 +104,20 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
 
 
 def rank(step: Step) -> float:
-    """Return a step's gain, less what it costs to say where an effect at a place is."""
-    return step.gain - A_PLACE_COSTS * (step.effect in EVERYWHERE)
+    """Return a step's gain, less what it costs to say where an effect acts."""
+    return step.gain - _place_costs(step.effect)
 
 
 def lead(found: Step, rival: str) -> float:
-    """Return by how much less a rival must cost to take an effect's place; by `EVERYWHERE` it may cost more."""
-    return -A_PLACE_COSTS if EVERYWHERE.get(found.effect) == rival else found.null_95
+    """Return by how much less a rival must cost to take an effect's place; by `UNPLACED` it may cost more."""
+    unplaced, _ = UNPLACED.get(found.effect, ("", 0))
+    return -_place_costs(found.effect) if unplaced == rival else found.null_95
+
+
+def _place_costs(effect: str) -> float:
+    """Return what it costs to say where an effect acts, in log-likelihood; 0 of one that does not say."""
+    _, parameters = UNPLACED.get(effect, ("", 0))
+    return 0.5 * float(chdtri(parameters, 0.05)) if parameters else 0.0
 
 
 def competing(stage: Sequence[Step]) -> list[Step]:

@@ -1,4 +1,4 @@
-"""What shafts, tyres, caster and floor give each other in one step: impulses, swept over until they fit.
+"""What shafts, tyres, floor and what drags on it give each other in one step: impulses, swept over until they fit.
 
 One step solves, for both wheels at once, the impulses that would end all slip within the step, and clips them to each
 wheel's friction circle; dry friction is the torque that would stop the shaft within the step, clipped to its budget.
@@ -21,12 +21,13 @@ def release_contacts(s: Any) -> None:
     """Take all impulses off; sweeps then find those of this step."""
     s.left_friction = s.right_friction = s.scrub = 0.0
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = 0.0
+    s.drag_push = s.drag_side = 0.0
     s.left_closed = s.right_closed = 1.0
 
 
 @kernel
 def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool = False) -> bool:
-    """Go once over shafts, tyres and caster, and give each what it asks for or all it can get.
+    """Go once over shafts, tyres, caster and what drags, and give each what it asks for or all it can get.
 
     Three sweeps suffice, and mostly one does.
 
@@ -35,7 +36,7 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
     s, c
         Records of dtypes `STATE`, whose speeds and impulses are updated, and `DERIVED`.
     effects
-        False where the robot has no play and no drag at the caster; see `gecar.world.kernel.dynamics.begin_step`.
+        False where the robot has no play and nothing that drags; see `gecar.world.kernel.dynamics.begin_step`.
     terms
         Whether the robot has terms, which may move a wheel's contact ahead of the axle.
     first
@@ -54,8 +55,15 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
         _scrub(s, c)
         sliding = True
     if effects and s.caster_circle > 0.0:
-        _drag_caster(s, c)
-        return False
+        s.caster_push, s.caster_side = _drag(
+            s, s.caster_push, s.caster_side, s.caster_circle, c.caster_mass, c.caster, 0.0, c
+        )
+        sliding = True
+    if effects and s.drag_circle > 0.0:
+        s.drag_push, s.drag_side = _drag(
+            s, s.drag_push, s.drag_side, s.drag_circle, c.drag_mass, c.drag_ahead, c.drag_left, c
+        )
+        sliding = True
     return settled and not sliding
 
 
@@ -155,10 +163,10 @@ def _shift_loads(s: Any, c: Any, aside: bool) -> None:
     """
     left = s.left_push / max(s.left_closed, 1e-30) if s.left_slides != 0.0 else s.left_push
     right = s.right_push / max(s.right_closed, 1e-30) if s.right_slides != 0.0 else s.right_push
-    shift = caster_load((left + right + s.caster_push) * c.inv_dt, c) - s.caster_load
+    shift = caster_load((left + right + s.caster_push + s.drag_push) * c.inv_dt, c) - s.caster_load
     s.caster_load += shift / (1.0 + 0.5 * s.grip * abs(c.caster_arm) * (s.left_slides + s.right_slides))
     if aside:
-        found = s.left_side + s.right_side + s.caster_side
+        found = s.left_side + s.right_side + s.caster_side + s.drag_side
         s.aside += found - s.aside_found
         s.aside_found = found
     left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
@@ -356,16 +364,34 @@ def _owed(earlier: float, asked: float, asks: float, push: float) -> float:
 
 
 @kernel
-def _drag_caster(s: Any, c: Any) -> None:
-    """Give the caster the impulse that would stop it, within its friction circle, against its motion."""
-    push = s.caster_push - c.caster_mass * s.u
-    side = s.caster_side - c.caster_mass * (s.w + s.yaw_rate * c.caster)
-    reach = push * push + side * side
-    if reach > s.caster_circle * s.caster_circle:
-        scale = s.caster_circle / math.sqrt(reach)
-        push *= scale
-        side *= scale
-    shove(s, push - s.caster_push, side - s.caster_side, c)
-    s.yaw_rate += (side - s.caster_side) * c.caster * c.inv_inertia
-    s.caster_push = push
-    s.caster_side = side
+def _drag(
+    s: Any, push: float, side: float, circle: float, mass: float, ahead: float, left: float, c: Any
+) -> tuple[float, float]:
+    """Give a point of the robot the impulse that would stop it, within its friction circle, against its motion.
+
+    Parameters
+    ----------
+    push, side
+        What it was given in the last sweep, ahead and to the left [N s].
+    circle
+        The most it can be given [N s].
+    mass
+        What an impulse there moves, at least [kg].
+    ahead, left
+        Where it is, from the centre of mass [m].
+
+    Returns
+    -------
+    tuple
+        What it is given, ahead and to the left.
+    """
+    more = push - mass * (s.u - s.yaw_rate * left)
+    more_side = side - mass * (s.w + s.yaw_rate * ahead)
+    reach = more * more + more_side * more_side
+    if reach > circle * circle:
+        scale = circle / math.sqrt(reach)
+        more *= scale
+        more_side *= scale
+    shove(s, more - push, more_side - side, c)
+    s.yaw_rate += ((more_side - side) * ahead - (more - push) * left) * c.inv_inertia
+    return more, more_side

@@ -1,7 +1,8 @@
 """The robot's motion, written once: pure compiled functions from duty and state to the next state.
 
 Frames: the body frame has u ahead and w to the left; impulses act at the wheels' contacts, at the axle, ``half_track``
-to the left and right of its centre, and at the caster. Position and velocity are those of the centre of mass.
+to the left and right of its centre, at the caster, and where something drags. Position and velocity are those of the
+centre of mass.
 
 A step turns commands into torques, sets what friction can give under each wheel's load, and lets
 `gecar.world.kernel.contacts` find the impulses; the same impulses, one step later, give the load transfer. Branches
@@ -42,8 +43,8 @@ from gecar.world.kernel.terms import ask, look_at
 _EFFECT_FIELDS = (
     "tilt_x", "tilt_y", "regulated", "start_latency", "dead_band", "direction_gain",
     "full_duty_gain", "ripple_amplitude", "static_friction", "friction_ratio", "rolling_resistance", "patch_radius",
-    "caster_friction", "battery_drain", "battery_resistance", "backlash", "viscous_difference", "constant_torque",
-    "dead_band_right", "dead_band_forward", "duty_bulge",
+    "caster_friction", "drag_force", "battery_drain", "battery_resistance", "backlash", "viscous_difference",
+    "constant_torque", "dead_band_right", "dead_band_forward", "duty_bulge",
 )  # fmt: skip
 _EFFECT_LIMITS = ("command_slew", "speed_limit", "current_limit")
 
@@ -290,13 +291,13 @@ def turn(s: Any, angle: float) -> None:
 
 @kernel
 def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
-    """Set what dry friction, tyres and caster can give in this step.
+    """Set what dry friction, tyres, caster and what drags can give in this step.
 
     Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
     wheel to wheel.
     """
-    s.caster_load = caster_load((s.left_push + s.right_push + s.caster_push) * c.inv_dt, c)
-    s.aside = s.left_side + s.right_side + s.caster_side
+    s.caster_load = caster_load((s.left_push + s.right_push + s.caster_push + s.drag_push) * c.inv_dt, c)
+    s.aside = s.left_side + s.right_side + s.caster_side + s.drag_side
     left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
     s.left_bears, s.right_bears = left, right
     s.left_dry = friction_budget(s.left_speed, left, c.left_radius, p, c, effects)
@@ -305,6 +306,7 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: bool) -> None:
     s.left_circle = s.grip * c.dt * left
     s.right_circle = s.grip * c.dt * right
     s.caster_circle = p.caster_friction * s.caster_load * c.dt
+    s.drag_circle = p.drag_force * c.dt
 
 
 @kernel

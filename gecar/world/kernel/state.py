@@ -15,7 +15,7 @@ REGULATOR_RATE = 30.0  # rad/s
 _STATE_FIELDS = (
     "t x y heading cos sin vx vy yaw_rate "
     "left_angle right_angle left_speed right_speed left_play right_play "
-    "left_push right_push left_side right_side caster_push caster_side "
+    "left_push right_push left_side right_side caster_push caster_side drag_push drag_side "
     "left_friction right_friction left_slides right_slides scrub "
     "left_duty right_duty left_integral right_integral battery_current "
     # where duties ramp: those at the beginning of the last step and on the mean, and the commands of the last two
@@ -29,7 +29,7 @@ _STATE_FIELDS = (
     "left_opened right_opened aside_found "
     # within a step: velocity in the body frame, budgets of dry friction, grip and drag, and what drives
     "half_turn u w "
-    "left_dry right_dry left_circle right_circle caster_circle grip left_closed right_closed "
+    "left_dry right_dry left_circle right_circle caster_circle drag_circle grip left_closed right_closed "
     "left_bears right_bears caster_load aside "
     "left_drive right_drive voltage"
 )
@@ -37,9 +37,9 @@ _DERIVED_FIELDS = (
     "dt inv_dt late mass inv_mass inv_inertia half_track axle caster left_radius right_radius inv_rotor rotor "
     "drive_gain keep left_gain right_gain left_dead right_dead slew torque lean "
     "m_ll m_lr m_rr m_ls m_rs m_ss n_ll n_ls n_lss n_rr n_rs n_rss left_mass right_mass side_mass caster_mass "
-    "left_load right_load "
-    "weight caster_static caster_arm transfer_side left_gap right_gap apart tilt_x tilt_y sliding ripple "
-    "regulator_p regulator_i"
+    "drag_mass left_load right_load "
+    "weight caster_static caster_arm transfer_side drag_ahead drag_left left_gap right_gap apart tilt_x tilt_y "
+    "sliding ripple regulator_p regulator_i"
 )
 
 STATE = np.dtype([(field, np.float64) for field in _STATE_FIELDS.split()])
@@ -71,6 +71,8 @@ def derive(p: Any, dt: float, c: Any) -> None:
     c.axle = -p.com_ahead
     c.apart = 0.0
     c.caster = p.caster_ahead - p.com_ahead
+    c.drag_ahead = p.drag_off_axle - p.com_ahead
+    c.drag_left = p.drag_left
     _rotor(p, dt, c)
     c.left_gain = 1.0 - 0.5 * p.gain_difference
     c.right_gain = 1.0 + 0.5 * p.gain_difference
@@ -166,6 +168,9 @@ def _contact_masses(c: Any) -> None:
     c.right_mass = 1.0 / right
     c.side_mass = 1.0 / side
     c.caster_mass = 1.0 / (c.inv_mass + c.caster * c.caster * c.inv_inertia)
+    c.drag_mass = 1.0 / (
+        c.inv_mass + (c.drag_ahead * c.drag_ahead + c.drag_left * c.drag_left) * c.inv_inertia
+    )
 
 
 @kernel
@@ -175,7 +180,7 @@ def place(s: Any, p: Any, x: float, y: float, heading: float) -> None:
     s.t = s.vx = s.vy = s.yaw_rate = for_zero
     s.left_angle = s.right_angle = s.left_speed = s.right_speed = s.left_play = s.right_play = for_zero
     s.left_push = s.right_push = s.left_side = s.right_side = s.caster_push = s.caster_side = for_zero
-    s.left_slides = s.right_slides = s.scrub = for_zero
+    s.drag_push = s.drag_side = s.left_slides = s.right_slides = s.scrub = for_zero
     s.left_latest = s.right_latest = s.left_earlier = s.right_earlier = for_zero
     s.left_asked = s.right_asked = s.left_asks = s.right_asks = for_zero
     s.left_slid = s.right_slid = s.left_held = s.right_held = for_zero

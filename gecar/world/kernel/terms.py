@@ -93,8 +93,8 @@ def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v
     v
         Record of dtype `VIEW`, overwritten.
     """
-    ahead = (s.left_push + s.right_push + s.caster_push) * c.inv_dt
-    aside = (s.left_side + s.right_side + s.caster_side) * c.inv_dt
+    ahead = (s.left_push + s.right_push + s.caster_push + s.drag_push) * c.inv_dt
+    aside = (s.left_side + s.right_side + s.caster_side + s.drag_side) * c.inv_dt
     wheel = 0.5 * (c.weight - min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight))
     v.left_time = v.right_time = s.t
     v.left_voltage = v.right_voltage = s.voltage if s.t > 0.0 else p.voltage * p.supply_scale

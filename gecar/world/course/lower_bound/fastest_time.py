@@ -80,7 +80,10 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
     grip = max(p["tyre_friction"], p["patch_friction"] if p["patch_radius"] > 0.0 else 0.0)
     # Unlike wheels: whatever the ground gives the larger as the outer one need not be paid back by the smaller.
     unlike = 0.5 * (large**2 - small**2) / damping * grip * p["mass"] * GRAVITY
-    speed = large * (torque + push - drag) / damping + unlike
+    # What drags aside pushes the outer wheel where the robot turns fast, or farther out than the wheels are.
+    lever = 0.5 * abs(1.0 - abs(p["drag_left"]) / track) if p["drag_left"] != 0.0 else 0.0
+    dragged = p["drag_force"] * lever * large
+    speed = large * (torque + push + dragged - drag) / damping + unlike
     inertia = p["inertia"] * p["inertia_scale"]
     rolling = 0.5 * p["mass"] * small**2
     yaw = p["yaw_inertia"] * p["yaw_inertia_scale"] + p["mass"] * behind**2
@@ -95,7 +98,7 @@ def sprint(robot: Robot, until_s: float = 0.0) -> Sprint:
     early = 0.5 * _LONGEST_STEP_S if p["regulated"] or p["duty_bulge"] > 0.0 or push > 0.0 else 0.0
     return Sprint(
         float(speed),
-        math.inf if free else float(large * p["speed_limit"] * (1.0 + over)),
+        math.inf if free or dragged > 0.0 else float(large * p["speed_limit"] * (1.0 + over)),
         float((inertia + min(rolling, turning)) / damping),
         float(dead - early),
         GRAVITY * tilt if holding <= 0.0 else 0.0,
