@@ -459,6 +459,8 @@ def test_what_drags_at_the_caster_is_the_caster(effect: str) -> None:
     stage = candidate_steps(problem.under(problem.known), problem.known)
     assert stage[0].effect == effect
     assert stage[0].model.values[effect] == pytest.approx(of[effect], rel=0.1)
+    point = [step for step in candidates(problem, stage) if step.effect == "point_drag"]
+    assert len(point) == (effect == "point_drag")
 
 
 def test_a_patch_gives_way_to_grip_lost_everywhere_and_to_nothing_else_as_likely() -> None:

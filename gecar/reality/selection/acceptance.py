@@ -33,7 +33,10 @@ from gecar.world.rollout import STEP_S
 Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 Share = Callable[[Parameter], float]  # of a parameter's size in the catalogue that is worth a name
 
-BREAKAWAY = "static_friction"
+BREAKAWAY, POINT = "static_friction", "point_drag"
+NEAR_CASTER_M = (
+    0.02  # a ball and its holder are as wide, and places are known no better (`gecar.world.effects`)
+)
 AT_BOUND = 0.01  # coordinates
 PHASES = 4  # of steps, over which a gain is averaged
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
@@ -94,7 +97,7 @@ def candidates(problem: Problem, stage: Sequence[Step]) -> list[Step]:
 
     On a bench nothing is noise: there, those of a size worth a name.
     """
-    stage = [step for step in stage if not imitates_dry_friction(problem, step.model)]
+    stage = [step for step in stage if not is_another(problem, step.model)]
     if problem.on_bench:
         stage = [step for step in stage if step.worthwhile]
     enough = [step for step in competing(stage)[:RUNNERS_UP] if not imitates_a_step(problem, step)]
@@ -131,12 +134,28 @@ def _worsens(problem: Problem, step: Step) -> bool:
     return not BY_ID[step.effect].at_a_place and worsens(problem, step.base, step.model)
 
 
-def imitates_dry_friction(problem: Problem, model: Model) -> bool:
-    """Whether a model's breakaway friction lasts up to speeds at which it must have given way to sliding friction."""
+def is_another(problem: Problem, model: Model) -> bool:
+    """Whether an effect of a model is another one by its shape: dry friction, or a caster that drags.
+
+    That is breakaway friction that lasts up to speeds at which it must have given way to sliding friction, and a point
+    that drags where the caster is.
+    """
+    return _is_dry_friction(problem, model) or _is_the_caster(problem, model)
+
+
+def _is_dry_friction(problem: Problem, model: Model) -> bool:
     if BREAKAWAY not in model.effects:
         return False
     fastest = max(map(top_speed, problem.recordings))
     return model.values[BREAKAWAY]["speed_rad_s"] > BREAKAWAY_SPEED * fastest > 0.0
+
+
+def _is_the_caster(problem: Problem, model: Model) -> bool:
+    if POINT not in model.effects:
+        return False
+    caster_m = abs(float(problem.estimator.robot.physics["caster_ahead"][0]))
+    at = model.values[POINT]
+    return math.hypot(at["left_m"], at["off_axle_m"] - caster_m) < NEAR_CASTER_M
 
 
 def imitates_a_step(problem: Problem, step: Step) -> bool:

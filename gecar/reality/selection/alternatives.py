@@ -9,7 +9,7 @@ import numpy as np
 
 from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.optimisation.least_squares import costs
-from gecar.reality.selection.acceptance import imitates_dry_friction, is_worthwhile
+from gecar.reality.selection.acceptance import is_another, is_worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
@@ -32,7 +32,7 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
     left = problem.residuals.errors(taken.physics)
     for effect, other in rivals.items():
         swapped = problem.estimator.fit((*rest, effect), {**taken.values, **other.model.values})
-        if imitates_dry_friction(problem, swapped) or not is_worthwhile(swapped, effect, problem.share):
+        if is_another(problem, swapped) or not is_worthwhile(swapped, effect, problem.share):
             continue
         estimator = problem.under(swapped).estimator
         errors = problem.residuals.errors(swapped.physics)

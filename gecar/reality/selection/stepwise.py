@@ -18,7 +18,7 @@ from gecar.reality.selection.acceptance import (
     candidates,
     competing,
     imitates_a_step,
-    imitates_dry_friction,
+    is_another,
     is_material,
     is_worthwhile,
     lead,
@@ -491,7 +491,7 @@ def _swapped(problem: Problem, found: Step, rest: Sequence[str], rivals: Sequenc
             if (
                 proved(step)
                 and not stopped(step, own=problem.on_bench)
-                and not imitates_dry_friction(problem, swapped)
+                and not is_another(problem, swapped)
                 and not imitates_a_step(problem, step)
             ):
                 return step
