@@ -135,22 +135,20 @@ def _worsens(problem: Problem, step: Step) -> bool:
 
 
 def is_another(problem: Problem, model: Model) -> bool:
-    """Whether an effect of a model is another one by its shape: dry friction, or a caster that drags.
-
-    That is breakaway friction that lasts up to speeds at which it must have given way to sliding friction, and a point
-    that drags where the caster is.
-    """
-    return _is_dry_friction(problem, model) or _is_the_caster(problem, model)
+    """Whether an effect of a model is another one by its shape: dry friction, or a caster that drags."""
+    return imitates_dry_friction(problem, model) or is_at_the_caster(problem, model)
 
 
-def _is_dry_friction(problem: Problem, model: Model) -> bool:
+def imitates_dry_friction(problem: Problem, model: Model) -> bool:
+    """Whether a model's breakaway friction lasts up to speeds at which it must have given way to sliding friction."""
     if BREAKAWAY not in model.effects:
         return False
     fastest = max(map(top_speed, problem.recordings))
     return model.values[BREAKAWAY]["speed_rad_s"] > BREAKAWAY_SPEED * fastest > 0.0
 
 
-def _is_the_caster(problem: Problem, model: Model) -> bool:
+def is_at_the_caster(problem: Problem, model: Model) -> bool:
+    """Whether what drags in a model does so where the caster is, or as far ahead of the axle."""
     if POINT not in model.effects:
         return False
     caster_m = abs(float(problem.estimator.robot.physics["caster_ahead"][0]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from gecar.reality.fitting.model import Effects, Model, Step
 from gecar.reality.optimisation.least_squares import costs
-from gecar.reality.selection.acceptance import is_another, is_worthwhile
+from gecar.reality.selection.acceptance import imitates_dry_friction, is_at_the_caster, is_worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.stepwise import Explanation
 from gecar.reality.selection.thresholds import CERTAIN, CLOSE, PRICE
@@ -32,13 +32,15 @@ def alternatives(explained: Explanation, step: Step) -> dict[str, Model]:
     left = problem.residuals.errors(taken.physics)
     for effect, other in rivals.items():
         swapped = problem.estimator.fit((*rest, effect), {**taken.values, **other.model.values})
-        if is_another(problem, swapped) or not is_worthwhile(swapped, effect, problem.share):
+        if imitates_dry_friction(problem, swapped) or not is_worthwhile(swapped, effect, problem.share):
             continue
         estimator = problem.under(swapped).estimator
         errors = problem.residuals.errors(swapped.physics)
         loss = costs(estimator.whitened(errors)) - costs(estimator.whitened(left))
         spans = np.bincount(estimator.blocks.spans, loss)
-        close = abs(loss.sum()) < min(CLOSE * step.gain, PRICE)  # what fits far better was refused
+        # What fits far better was refused, but for what drags at the caster's place, which goes by the caster's name.
+        most = min(CLOSE * step.gain, PRICE)
+        close = loss.sum() < most and (loss.sum() > -most or is_at_the_caster(problem, swapped))
         if close and loss.sum() < CERTAIN * np.sqrt(np.sum((spans - spans.mean()) ** 2)):
             out[effect] = swapped
     return out
