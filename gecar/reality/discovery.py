@@ -31,7 +31,7 @@ from gecar.reality.fitting.model import Model, Step
 from gecar.reality.invent.beside import lessened
 from gecar.reality.invent.corrected_replay import with_formulas
 from gecar.reality.invent.formula import Formula, describe
-from gecar.reality.invent.invention import OF_THE_MOUNT, invent, of_both_motors
+from gecar.reality.invent.invention import OF_THE_CAMERA, OF_THE_MOUNT, invent, of_both_motors
 from gecar.reality.invent.sentences import elsewhere
 from gecar.reality.locate.hotspot import ABOUT_M, middle, strongest_place, with_spot
 from gecar.reality.locate.mismatch_map import MismatchMap
@@ -39,6 +39,7 @@ from gecar.reality.locate.moments import Acting, kind_of_driving, moments
 from gecar.reality.locate.path_check import path_in_doubt
 from gecar.reality.materiality import DEFAULT, Material, Size, combined
 from gecar.reality.noise.sensor_noise import Noise, estimate_noise
+from gecar.reality.optimisation.least_squares import cost
 from gecar.reality.prove.confirmation import (
     Confirmation,
     confirmed,
@@ -99,6 +100,9 @@ FOR_A_LAW = 0.25  # of the material size must be left; what stood in for oval wh
 # Laws in the place of effects must leave so much less, or explain so much more, than laws beside them; and laws where
 # nothing material is left must leave so much less than there was.
 INSTEAD = 0.7
+# Times the misfit of readings along the camera's own path that a law's path must leave for the law to be refused: laws
+# for a table that shakes leave far more, and right ones less.
+READS_WORSE = 1.2
 REPAIRS = 3  # of logs, at most: by the known robot first, then by the one found
 # Times the material size, and what recordings fitted on leave, that one set aside must leave to be told of by itself.
 ASTRAY = 3.0
@@ -371,32 +375,64 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
     anew. What is left may be at one place on the floor, or in one kind of driving, or else one instrument may be wrong,
     or something acts now and then.
     """
-    motion = _motion(context, seen, held)
+    effects = _with_intervals(context, seen, held)
+    motion = _written(context, effects)
     renewed = motion.explained.problem.with_clocks_beside(motion.explained.taken) if motion.laws else None
     if renewed is not None:
         context.tell("once more with the camera's clocks as they are beside laws")
-        again = _motion(context, explained_and_confirmed(problem.filmed_as(renewed), held), held)
-        motion = min(motion, again, key=_left)
+        anew = explained_and_confirmed(problem.filmed_as(renewed), held)
+        motion = min(motion, _written(context, _with_intervals(context, anew, held)), key=_left)
+    if context.language is not None and _reads_worse(motion):
+        context.tell(
+            "the colour sensor read its lines where the camera says: once more without laws of the camera"
+        )
+        motion = _written(replace(context, language=elsewhere(context.language, OF_THE_CAMERA)), effects)
     if motion.laws:
-        return motion
+        return _explained_in_other_driving(context, effects, motion, problem.residuals, held)
     found = replace(motion, explained=with_spot(motion.explained))
     if not found.explained.unexplained:
         return found
-    elsewhere = _explained_elsewhere(context, found.explained, found.candidates, problem.residuals, held)
-    if elsewhere or not motion.explained.unexplained:
-        return elsewhere or found
+    away = _explained_elsewhere(context, found.explained, found.candidates, problem.residuals, held)
+    if away or not motion.explained.unexplained:
+        return away or found
     found = _explained_at_other_times(context, found, kind_of_driving, problem.residuals, held)
     if found.left_out:
         return found
-    without = (_explained_without(context, each, problem.residuals, held) for each in INSTRUMENTS)
+    without = (_explained_without(context, each, found, problem.residuals, held) for each in INSTRUMENTS)
     in_part = next(filter(None, without), None)
     return in_part or _explained_at_other_times(context, found, moments, problem.residuals, held)
 
 
-def _motion(context: _Context, seen: Confirmation, held: Residuals) -> _Stage:
-    """Explain the motion by effects that are confirmed, and add laws."""
-    motion = _with_intervals(context, seen, held)
-    return _with_laws(context, _with_law_of_both_motors(context, motion))
+def _written(context: _Context, effects: _Stage) -> _Stage:
+    """Add laws to what effects explain of the motion."""
+    return _with_laws(context, _with_law_of_both_motors(context, effects))
+
+
+def _reads_worse(motion: _Stage) -> bool:
+    """Whether laws of what the camera sees put the colour sensor where it would have read something else.
+
+    It read the lines from where the robot was: if the camera's own path says that, the camera is right.
+    """
+    explained = motion.explained
+    robot = explained.taken.parameters.robot.with_effects(explained.taken.values)
+    others = [term for term in robot.term if term.port not in OF_THE_CAMERA]
+    if len(others) == len(robot.term):
+        return False
+    costs = []
+    for physics in (robot.physics, robot.with_terms(others).physics):
+        along = _along_paths(explained.problem.residuals.everywhere(), explained, physics).of_sensor()
+        costs.append(cost(along.errors(physics)) if along.recordings else 0.0)
+    return costs[0] > READS_WORSE * costs[1] + PRICE
+
+
+def _explained_in_other_driving(
+    context: _Context, effects: _Stage, written: _Stage, fitted: Residuals, held: Residuals
+) -> _Stage:
+    """Return what explains all but one kind of driving, in the place of laws that leave much; or these."""
+    if not written.explained.unexplained:
+        return written
+    found = _explained_at_other_times(context, effects, kind_of_driving, fitted, held)
+    return found if found.left_out else written
 
 
 def _explained_elsewhere(
@@ -480,12 +516,13 @@ def _explained_in_part(
 
 
 def _explained_without(
-    context: _Context, instrument: str, fitted: Residuals, held: Residuals
+    context: _Context, instrument: str, before: _Stage, fitted: Residuals, held: Residuals
 ) -> _Stage | None:
     """Explain motion without the encoders, or without the poses, where nothing explains those; None if that fails.
 
     One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
-    What was found may explain both: beside all that two causes do, either alone may make whole drives worse.
+    What was found may explain both: beside all that two causes do, either alone may make whole drives worse. Without
+    encoders that err, whole paths come out no worse than ``before`` with them.
     """
     measured = {name for run in fitted.recordings for name in run.recording.measured}
     alone, beside = (residuals.without(instrument) for residuals in (fitted, held))
@@ -499,6 +536,8 @@ def _explained_without(
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
+    if instrument == "encoders" and _left(motion) > _left(before):
+        return None
     return replace(motion, left_out=WITHOUT[instrument])
 
 

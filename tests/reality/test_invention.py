@@ -235,7 +235,7 @@ TEETH = parse_grammar(
 
 
 def test_a_gear_that_sticks_at_one_angle_of_the_turn_is_found():
-    (law,) = verdict_on(TOOTH, invents=True, language=TEETH).invented
+    (law,) = verdict_on(TOOTH, language=TEETH).invented
     assert law.looks_like == "a gear that sticks at one angle of a turn, on the right wheel alone"
     assert law.parameters["k2"].value == pytest.approx(1.2, abs=0.05)
     turn = {"angle": np.linspace(0.0, 2.0 * np.pi, 200)}
@@ -669,6 +669,20 @@ def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
         runs.append(replace(run, reflection_pct=np.round(run.reflection_pct * light)))
     verdict = discover(Case("lamp", tuple(runs)), catalogue=UNRELATED, language=language, invents=True)
     assert [law.term.port for law in verdict.invented] == ["colour_reading"] * (not waxing)
+
+
+DRIFTS = "<t> ::= pose_y: c * time | yaw_moment: c * 1 | colour_reading: c * 1"
+
+
+@pytest.mark.parametrize("of_floor", [False, True], ids=["camera", "floor"])
+def test_a_camera_that_drifts_is_told_from_a_floor_that_does_by_where_lines_are_read(of_floor):
+    drift, runs = 0.005, []
+    for seed in (0, 2, 3, 5, 7):
+        run = seen_on_the_course(seed, EV3, up_m=0.5, drift_m_s=drift * of_floor)
+        runs.append(replace(run, y_m=run.y_m + drift * (not of_floor) * run.t_s))
+    verdict = discover(Case("drift", tuple(runs)), catalogue=UNRELATED, language=parse_grammar(DRIFTS))
+    assert [law.term.port for law in verdict.invented] == ["pose_y"] * (not of_floor)
+    assert verdict.verdict == ("unexplained" if of_floor else "invented")
 
 
 @pytest.mark.parametrize(

@@ -147,13 +147,15 @@ def test_a_line_lies_elsewhere_beside_unexplained_motion_only_if_it_does_in_all_
     assert ("line_shift" in {f.id for f in verdict.effects}) is not bumped
 
 
-def seen_on_the_course(seed: int, robot: Robot, moved: Robot = EV3, up_m: float = 0.0) -> Recording:
+def seen_on_the_course(
+    seed: int, robot: Robot, moved: Robot = EV3, up_m: float = 0.0, drift_m_s: float = 0.0
+) -> Recording:
     """Let a robot's colour sensor look at the paper's course on its way, with 0.8 % of noise, in whole percent.
 
-    The way is that of another robot, ``up_m`` farther up.
+    The way is that of another robot, ``up_m`` farther up, on a floor that carries it on.
     """
     run = recorded(moved, seed)
-    run = replace(run, y_m=run.y_m + up_m)
+    run = replace(run, y_m=run.y_m + up_m + drift_m_s * run.t_s)
     run = replace(run, setup=replace(run.setup, course="paper"))
     run = replace(run, reflection_pct=np.zeros(len(run.t_s)))
     beside = residuals_of(run, estimate_noise([run], EV3.physics, 1.0), 1.0, load_course("paper"))

@@ -52,6 +52,7 @@ MOSTLY = 0.9  # of all rows lie below where a law moves the sensor most
 # About a robot's length: the point that a force comes from is known to so much, or to as near as the robot came.
 POINT_KNOWN_M = 0.25
 OF_THE_MOUNT = ("sensor_ahead", "sensor_aside")  # ports of laws that need a path that is known
+OF_THE_CAMERA = tuple(port.id for port in PORTS if port.sensor == "camera")
 OF_PLACE = frozenset(("x", "y", "heading", "distance"))  # variables that only a known place has
 OF_FLOOR = OF_PLACE | {"ahead", "aside", "turn_rate", "load", "slip"}  # and that a motor on a bench has not
 OF_BOTH_MOTORS = frozenset(("other_command",))  # of laws that act while both are driven
