@@ -148,16 +148,22 @@ def test_a_patch_has_edges_or_grips_less_than_half_as_much(low: float, grip: flo
 
 
 @pytest.mark.parametrize(
-    ("gain", "offset", "doubtful", "contained"),
-    [((0.99, 2.0), (-40.0, 0.2), True, True), ((0.99, 2.0), (-40.0, 0.2), False, False),
-     ((1.1, 2.0), (-40.0, 0.2), True, False)],
+    ("gain", "offset", "darker_pct", "doubtful", "contained"),
+    [((0.99, 2.0), (-40.0, 0.2), 20.5, True, True), ((0.99, 2.0), (-40.0, 0.2), 20.5, False, False),
+     ((1.1, 2.0), (-40.0, 0.2), 20.5, True, False), ((0.99, 2.0), (-0.9, -0.2), 0.5, True, True),
+     ((0.99, 2.0), (-2.0, -1.0), 1.5, True, False)],
 )  # fmt: skip
-def test_gain_and_offset_may_both_be_neutral_but_not_along_a_path_in_doubt(
-    gain: tuple[float, float], offset: tuple[float, float], doubtful: bool, contained: bool
+def test_along_a_path_in_doubt_gain_or_offset_must_be_there_and_worth_a_name(
+    gain: tuple[float, float], offset: tuple[float, float], darker_pct: float, doubtful: bool, contained: bool
 ) -> None:
-    """Beside motors that ignored commands, a white floor of 145 % (99 or more), 21 % less (0 or less), was named."""
-    model = SimpleNamespace(parameters=free(EV3, ["sensor_gain"]))
-    spans = {"gain": Interval(1.45, *gain, "-"), "offset_pct": Interval(-20.5, *offset, "%")}
+    """Beside motors that ignored commands, a white floor of 145 % (99 or more), 21 % less (0 or less), was named.
+
+    Beside a turret that swings it was one of 119 % (99.8 or more), 0.5 % less (0.2 or more).
+    """
+    parameters = free(EV3, ["sensor_gain"])
+    z = parameters.vector({"sensor_gain": {"gain": 1.45, "offset_pct": -darker_pct}})
+    spans = {"gain": Interval(1.45, *gain, "-"), "offset_pct": Interval(-darker_pct, *offset, "%")}
+    model = SimpleNamespace(parameters=parameters, z=z)
     assert contains_neutral(model, "sensor_gain", {"sensor_gain": spans}, doubtful) is contained  # type: ignore[arg-type]
 
 

@@ -90,18 +90,21 @@ def contains_neutral(
     """Whether an effect may as well be absent: its interval holds the neutral value, or would ``times`` as long.
 
     Several sizes may each be neutral while not all of them are (gain and offset, where readings are clipped): of those,
-    what they gain together decides. Where that is ``doubtful``, one of them at least must not be.
+    what they gain together decides. Where that is ``doubtful``, one of them at least must not be, and be worth a name.
     """
     if BY_ID[effect].at_a_place:
         return not _is_place(model, spans[effect])
     sizes = [
-        (c, spans[effect][c.parameter.label])
-        for c in model.parameters.coordinates
+        (k, c, spans[effect][c.parameter.label])
+        for k, c in enumerate(model.parameters.coordinates)
         if c.effect.id == effect and (c.parameter.worthwhile > 0.0 or c.inverse)
     ]
     if len(sizes) > 1:
-        return doubtful and all(span.low <= c.value(0.0) <= span.high for c, span in sizes)
-    return _is_near_neutral(*sizes[0], times)
+        return doubtful and all(
+            abs(model.z[k]) < 1.0 or span.low <= c.value(0.0) <= span.high for k, c, span in sizes
+        )
+    ((_, c, span),) = sizes
+    return _is_near_neutral(c, span, times)
 
 
 def _is_near_neutral(c: Coordinate, span: Interval, times: float) -> bool:
