@@ -49,7 +49,7 @@ from gecar.reality.prove.confirmation import (
     steady,
     with_better_readings,
 )
-from gecar.reality.prove.holdout import Contender, judge
+from gecar.reality.prove.holdout import Contender, gaps, judge
 from gecar.reality.prove.whiteness import whiteness
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.reality.recordings.split import Split, hold_out, with_enough
@@ -404,8 +404,26 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
 
 
 def _written(context: _Context, effects: _Stage) -> _Stage:
-    """Add laws to what effects explain of the motion."""
-    return _with_laws(context, _with_law_of_both_motors(context, effects))
+    """Add laws to what effects explain of the motion, if whole drives set aside come out no worse with them.
+
+    A law may mend what effects do that were refused: beside these it helps, and beside nothing it does not.
+    """
+    found = _with_laws(context, _with_law_of_both_motors(context, effects))
+    if not found.laws or not effects.held.recordings:
+        return found
+    was, now = gaps(*(_set_aside(stage.explained, effects.held) for stage in (effects, found)))
+    return found if now <= was else effects
+
+
+def _set_aside(explained: Explanation, held: Residuals) -> Contender:
+    """Return the robot of an explanation beside the recordings set aside."""
+    taken = explained.taken
+    return Contender(_robot(taken), explained.problem.with_its_camera(held, taken.physics))
+
+
+def _robot(taken: Model) -> Robot:
+    """Return the robot of a model, with its effects and laws."""
+    return taken.parameters.robot.with_effects(taken.values)
 
 
 def _reads_worse(motion: _Stage) -> bool:
@@ -414,7 +432,7 @@ def _reads_worse(motion: _Stage) -> bool:
     It read the lines from where the robot was: if the camera's own path says that, the camera is right.
     """
     explained = motion.explained
-    robot = explained.taken.parameters.robot.with_effects(explained.taken.values)
+    robot = _robot(explained.taken)
     others = [term for term in robot.term if term.port not in OF_THE_CAMERA]
     if len(others) == len(robot.term):
         return False
@@ -555,7 +573,7 @@ def _explain_sensor(
     if not residuals.recordings:
         return None
     # A late camera and a skewed clock shift what is read, too.
-    known = motion.taken.parameters.robot.with_effects(motion.taken.values)
+    known = _robot(motion.taken)
     beside = held.of_sensor()
     problem = _problem(context, known, residuals, beside)
     problem = replace(problem, sizes=replace(problem.sizes, off=motion.left))

@@ -651,6 +651,9 @@ def test_an_effect_beside_a_law_is_named_only_if_it_is_material_there(monkeypatc
 
 @pytest.mark.parametrize("absent", [True, False])
 def test_an_effect_that_may_as_well_be_absent_beside_a_law_is_not_named(monkeypatch, absent):
+    # It is there: without it drives are farther off, and much is left.
+    monkeypatch.setattr(discovery, "gaps", lambda *_: (1.0, 1.0))
+    monkeypatch.setattr(discovery, "kind_of_driving", lambda *_: None)
     monkeypatch.setattr(
         beside, "weakest_absent", lambda _, steps, *__, **___: next(iter(steps if absent else ()), None)
     )
@@ -669,6 +672,20 @@ def test_no_law_makes_readings_darker_where_the_light_waxes_and_wanes(waxing):
         runs.append(replace(run, reflection_pct=np.round(run.reflection_pct * light)))
     verdict = discover(Case("lamp", tuple(runs)), catalogue=UNRELATED, language=language, invents=True)
     assert [law.term.port for law in verdict.invented] == ["colour_reading"] * (not waxing)
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_laws_are_refused_that_leave_whole_drives_set_aside_farther_off(monkeypatch, there):
+    with_law = robot_with(dict(DRAG))
+    runs = [recorded(with_law if there else EV3, seed) for seed in range(4)]
+    fitted, held = motion_of(runs[:3]), motion_of(runs[3:])
+    effects, found = (
+        discovery._Stage(explain(problem_of(fitted, robot, [])), (), (), {}, held, robot.term)
+        for robot in (EV3, with_law)
+    )
+    monkeypatch.setattr(discovery, "_with_law_of_both_motors", lambda _, stage: stage)
+    monkeypatch.setattr(discovery, "_with_laws", lambda *_: found)
+    assert discovery._written(None, effects) is (found if there else effects)
 
 
 DRIFTS = "<t> ::= pose_y: c * time | yaw_moment: c * 1 | colour_reading: c * 1"
