@@ -34,9 +34,7 @@ Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 Share = Callable[[Parameter], float]  # of a parameter's size in the catalogue that is worth a name
 
 BREAKAWAY, POINT = "static_friction", "point_drag"
-NEAR_CASTER_M = (
-    0.02  # a ball and its holder are as wide, and places are known no better (`gecar.world.effects`)
-)
+NEAR_CASTER_M = 0.02  # a ball and its holder are as wide
 AT_BOUND = 0.01  # coordinates
 PHASES = 4  # of steps, over which a gain is averaged
 RUNNERS_UP = 4  # effects of a stage that are judged, and tried in the place of what was taken
