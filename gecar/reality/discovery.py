@@ -539,8 +539,8 @@ def _explained_without(
     """Explain motion without the encoders, or without the poses, where nothing explains those; None if that fails.
 
     One of them that errs in a way of its own would otherwise hide what the other shows, as it counts in every sample.
-    What was found may explain both: beside all that two causes do, either alone may make whole drives worse. Without
-    encoders that err, whole paths come out no worse than ``before`` with them.
+    What was found may explain both: beside all that two causes do, either alone may make whole drives worse. Names
+    given ``before`` are only lost if whole paths come out no worse without encoders, or encoders better without poses.
     """
     measured = {name for run in fitted.recordings for name in run.recording.measured}
     alone, beside = (residuals.without(instrument) for residuals in (fitted, held))
@@ -554,9 +554,10 @@ def _explained_without(
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
-    if instrument == "encoders" and _left(motion) > _left(before):
-        return None
-    return replace(motion, left_out=WITHOUT[instrument])
+    named, again = ({step.effect for step in stage.explained.steps} for stage in (before, motion))
+    costs = [motion.explained.problem.cost_of(stage.explained.taken.physics) for stage in (before, motion)]
+    worse = _left(motion) > _left(before) if instrument == "encoders" else costs[0] - costs[1] < PRICE
+    return None if named - again and worse else replace(motion, left_out=WITHOUT[instrument])
 
 
 def _problem(context: _Context, robot: Robot, fitted: Residuals, held: Residuals) -> Problem:
