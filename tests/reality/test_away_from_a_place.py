@@ -85,13 +85,13 @@ def test_an_effect_is_found_beside_something_unknown_at_one_place(
     monkeypatch: pytest.MonkeyPatch, much: bool
 ) -> None:
     """Also where it leaves little of whole drives, as beside an effect that does far more, and shows at the place."""
-    motion = discovery._motion
+    written = discovery._written
 
     def leaving(*given: object) -> object:
-        stage = motion(*given)
+        stage = written(*given)
         return replace(stage, explained=replace(stage.explained, unexplained=much))
 
-    monkeypatch.setattr(discovery, "_motion", leaving)
+    monkeypatch.setattr(discovery, "_written", leaving)
     monkeypatch.setattr(discovery, "with_spot", lambda explained: replace(explained, unexplained=True))
     robot = EV3.with_effects(WHEELS).with_terms([KICK])
     verdict = discover(Case("made", tuple(across(robot, seed) for seed in range(6))))
