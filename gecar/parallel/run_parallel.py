@@ -133,7 +133,8 @@ def perform_each(
             stop_workers()
             raise
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
+            # Futures end with their workers; cancelled just then, one would print a traceback.
+            executor.shutdown(wait=False)
 
 
 def _say_death(deaths: int) -> None:
