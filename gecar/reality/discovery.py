@@ -418,12 +418,7 @@ def _written(context: _Context, effects: _Stage) -> _Stage:
 def _set_aside(explained: Explanation, held: Residuals) -> Contender:
     """Return the robot of an explanation beside the recordings set aside."""
     taken = explained.taken
-    return Contender(_robot(taken), explained.problem.with_its_camera(held, taken.physics))
-
-
-def _robot(taken: Model) -> Robot:
-    """Return the robot of a model, with its effects and laws."""
-    return taken.parameters.robot.with_effects(taken.values)
+    return Contender(taken.robot, explained.problem.with_its_camera(held, taken.physics))
 
 
 def _reads_worse(motion: _Stage) -> bool:
@@ -432,7 +427,7 @@ def _reads_worse(motion: _Stage) -> bool:
     It read the lines from where the robot was: if the camera's own path says that, the camera is right.
     """
     explained = motion.explained
-    robot = _robot(explained.taken)
+    robot = explained.taken.robot
     others = [term for term in robot.term if term.port not in OF_THE_CAMERA]
     if len(others) == len(robot.term):
         return False
@@ -446,7 +441,7 @@ def _reads_worse(motion: _Stage) -> bool:
 def _explained_in_other_driving(
     context: _Context, effects: _Stage, written: _Stage, fitted: Residuals, held: Residuals
 ) -> _Stage:
-    """Return what explains all but one kind of driving, in the place of laws that leave much; or these."""
+    """Leave out one kind of driving instead of keeping laws that leave much, if effects explain all other driving."""
     if not written.explained.unexplained:
         return written
     found = _explained_at_other_times(context, effects, kind_of_driving, fitted, held)
@@ -555,9 +550,18 @@ def _explained_without(
     if not (seen.explained.unexplained or seen.candidates):
         return seen
     named, again = ({step.effect for step in stage.explained.steps} for stage in (before, motion))
-    costs = [motion.explained.problem.cost_of(stage.explained.taken.physics) for stage in (before, motion)]
-    worse = _left(motion) > _left(before) if instrument == "encoders" else costs[0] - costs[1] < PRICE
-    return None if named - again and worse else replace(motion, left_out=WITHOUT[instrument])
+    if named - again and _is_worse_without(instrument, before.explained, motion.explained):
+        return None
+    return replace(motion, left_out=WITHOUT[instrument])
+
+
+def _is_worse_without(instrument: str, before: Explanation, without: Explanation) -> bool:
+    """Whether whole paths come out worse without encoders, or the encoders no better without poses."""
+    if instrument == "encoders":
+        times = without.problem.material.times
+        return times(without.left) > times(before.left)
+    was, now = (without.problem.cost_of(each.taken.physics) for each in (before, without))
+    return was - now < PRICE
 
 
 def _problem(context: _Context, robot: Robot, fitted: Residuals, held: Residuals) -> Problem:
@@ -574,7 +578,7 @@ def _explain_sensor(
     if not residuals.recordings:
         return None
     # A late camera and a skewed clock shift what is read, too.
-    known = _robot(motion.taken)
+    known = motion.taken.robot
     beside = held.of_sensor()
     problem = _problem(context, known, residuals, beside)
     problem = replace(problem, sizes=replace(problem.sizes, off=motion.left))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.concealing import EV3, recorded
 
+from gecar.reality import discovery
 from gecar.reality.discovery import discover
+from gecar.reality.materiality import DEFAULT, Size
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.world.robot import Robot
 
@@ -69,3 +72,20 @@ def test_an_instrument_that_errs_alone_is_unexplained_and_nothing_is_named(
 ) -> None:
     verdict = discover(Case("made", tuple(damaged(EV3, seed) for seed in range(4))))
     assert (verdict.verdict, verdict.effects) == ("unexplained", ())
+
+
+@pytest.mark.parametrize(
+    ("instrument", "off_mm", "cost", "worse"),
+    [("encoders", 28.0, 50.0, True), ("encoders", 8.0, 100.0, False),
+     ("poses", 28.0, 50.0, False), ("poses", 8.0, 95.0, True)],
+)  # fmt: skip
+def test_paths_speak_for_the_encoders_and_encoders_for_the_poses(
+    instrument: str, off_mm: float, cost: float, worse: bool
+) -> None:
+    """Before, 9 mm a metre are left, and the instrument that stays costs 100."""
+    problem = SimpleNamespace(material=DEFAULT, cost_of=float)
+    before, without = (
+        SimpleNamespace(problem=problem, left=Size(mm_1m=mm), taken=SimpleNamespace(physics=costs))
+        for mm, costs in ((9.0, 100.0), (off_mm, cost))
+    )
+    assert discovery._is_worse_without(instrument, before, without) is worse  # type: ignore[arg-type]

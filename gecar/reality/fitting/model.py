@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gecar.reality.fitting.parameters import Parameters
 from gecar.reality.optimisation.least_squares import Minimum
+from gecar.world.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
@@ -42,6 +43,11 @@ class Model:
     def values(self) -> dict[str, dict[str, float]]:
         """Parameters' values as in a robot file."""
         return self.parameters.values(self.minimum.z)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot with these effects, and the laws it has."""
+        return self.parameters.robot.with_effects(self.values)
 
     @property
     def physics(self) -> npt.NDArray[Any]:

@@ -371,9 +371,7 @@ def _gain_set_aside(before: Explanation, after: Explanation, held: Residuals) ->
     gain = cost(without) - cost(having)
     if gain <= 0.0 or share.margin <= 0.0:
         return None
-    was, now = gaps(
-        *(Contender(e.problem.estimator.robot.with_effects(e.taken.values), seen) for e, seen in filmed)
-    )
+    was, now = gaps(*(Contender(e.taken.robot, seen) for e, seen in filmed))
     return gain if now < (1.0 if share.is_whole else HELPS) * was else None
 
 
