@@ -31,7 +31,7 @@ from gecar.reality.replay.pose_filter import (
     predict_pose,
     rebase,
 )
-from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, step_with_terms
+from gecar.world.kernel.dynamics import bench_step_with_terms, drift, has_terms, is_light, step_with_terms
 from gecar.world.kernel.laws import N_STORES, SUPPLY_ASKED
 from gecar.world.kernel.lock_step import (
     N_FIELDS,
@@ -48,7 +48,7 @@ from gecar.world.kernel.lock_step import (
     store_state,
 )
 from gecar.world.kernel.motor import bench_step, supply
-from gecar.world.kernel.state import derive, place
+from gecar.world.kernel.state import ALL, LIGHT, derive, place
 from gecar.world.kernel.terms import (
     PORT_ENCODER,
     PORT_GYRO,
@@ -283,8 +283,8 @@ def _act(left: float, right: float, flat: Array, lanes: int) -> None:
 
 
 @kernel
-def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int) -> None:
-    """Advance every lane by one step under the same commands."""
+def _advance(left: float, right: float, bench: bool, light: bool, flat: Array, lanes: int) -> None:
+    """Advance every lane by one step under the same commands; ``light`` as `gecar.world.kernel.dynamics.is_light`."""
     if bench:
         for lane in range(lanes):
             s = load_state(flat, lanes, lane)
@@ -292,7 +292,10 @@ def _advance(left: float, right: float, bench: bool, flat: Array, lanes: int) ->
             store_state(flat, lanes, lane, s)
         return
     _act(left, right, flat, lanes)
-    advance_lanes(flat, lanes, effects=True)
+    if light and lanes > 1:
+        advance_lanes(flat, lanes, LIGHT)
+    else:
+        advance_lanes(flat, lanes, ALL)
 
 
 @kernel
@@ -389,7 +392,7 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:  # noqa: C901
 
     def replay(
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
-        flat: Array, weights: Array, stores: Array, kept: Kept, alike: bool,
+        flat: Array, weights: Array, stores: Array, kept: Kept, alike: bool, light: bool,
     ) -> None:  # fmt: skip
         _begin(physics, start, dt, flat, lanes)
         shared = physics[0]
@@ -431,7 +434,7 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:  # noqa: C901
             right = _held(inputs.commands, inputs.command_t, _RIGHT, at, begin, end, cap) * share
             _remember_yaw(flat, lanes)
             if not acts:
-                _advance(left, right, inputs.bench, flat, lanes)
+                _advance(left, right, inputs.bench, light, flat, lanes)
             elif lanes == 1:
                 _advance_one_with_terms(left, right, inputs.bench, physics, stores, flat)
             else:
@@ -472,6 +475,19 @@ def replay_rows(
     several = _replay_lanes_with_terms if has_terms(physics).any() else _replay_lanes
     play = _replay_one if lanes == 1 else several
     alike = lanes > 1 and len(set(formulas_of(physics))) == 1
+    light = bool(is_light(physics).all())
     flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(N_STORES * lanes)
-    play(inputs, np.ascontiguousarray(physics), start, offset, dt, flat, np.zeros(4), stores, kept, alike)
+    play(
+        inputs,
+        np.ascontiguousarray(physics),
+        start,
+        offset,
+        dt,
+        flat,
+        np.zeros(4),
+        stores,
+        kept,
+        alike,
+        light,
+    )
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

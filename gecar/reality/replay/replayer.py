@@ -21,7 +21,7 @@ from gecar.reality.recordings.recording import Recording
 from gecar.reality.replay.kernel import ROW_COLUMNS, TIMING, replay_rows
 from gecar.reality.replay.kernel_input import KernelInput
 from gecar.reality.replay.rigid_alignment import moved_start
-from gecar.world.kernel.dynamics import has_terms
+from gecar.world.kernel.dynamics import has_terms, is_light
 from gecar.world.robot import Robot
 from gecar.world.rollout import STEP_S
 from gecar.world.terms import formulas_of, ports_of
@@ -297,11 +297,11 @@ def _enters(rows: Array, physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
 def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_], bench: bool) -> Iterator[list[int]]:
     """Yield which of some records to replay together: up to `LANES` that share `TIMING` and where their terms act.
 
-    Those whose laws differ in constants alone stand side by side. Few are replayed one by one, and so are motors with
-    laws.
+    Light robots are kept apart from others, which take twice as long. Those whose laws differ in constants alone
+    stand side by side. Few are replayed one by one, and so are motors with laws.
     """
     robots = physics[numbers]
-    keys: list[Any] = robots[list(TIMING)].tolist()
+    keys: list[Any] = list(zip(robots[list(TIMING)].tolist(), is_light(robots).tolist(), strict=True))
     laws = [b""] * len(robots)
     if has_terms(robots).any():
         keys = list(zip(keys, ports_of(robots), strict=True))

@@ -14,6 +14,7 @@ import math
 from typing import Any
 
 from gecar.compiled import kernel
+from gecar.world.kernel.state import ALL
 
 
 @kernel
@@ -26,7 +27,7 @@ def release_contacts(s: Any) -> None:
 
 
 @kernel
-def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool = False) -> bool:
+def sweep(s: Any, c: Any, effects: int = ALL, terms: bool = False, first: bool = False) -> bool:
     """Go once over shafts, tyres, caster and what drags, and give each what it asks for or all it can get.
 
     Three sweeps suffice, and mostly one does.
@@ -36,7 +37,7 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
     s, c
         Records of dtypes `STATE`, whose speeds and impulses are updated, and `DERIVED`.
     effects
-        False where the robot has no play and nothing that drags; see `gecar.world.kernel.dynamics.begin_step`.
+        `ALL` where the robot has play, or something drags; see `gecar.world.kernel.dynamics.begin_step`.
     terms
         Whether the robot has terms, which may move a wheel's contact ahead of the axle.
     first
@@ -48,18 +49,18 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
         Whether another sweep would change nothing: turning or standing shafts, gripping tyres.
     """
     settled = rub_shafts(s, c)
-    if effects and first:
+    if effects == ALL and first:
         _meet(s, c)
     sliding = _roll(s, c, effects, first)
     if terms and c.apart != 0.0:
         _scrub(s, c)
         sliding = True
-    if effects and s.caster_circle > 0.0:
+    if effects == ALL and s.caster_circle > 0.0:
         s.caster_push, s.caster_side = _drag(
             s, s.caster_push, s.caster_side, s.caster_circle, c.caster_mass, c.caster, 0.0, c
         )
         sliding = True
-    if effects and s.drag_circle > 0.0:
+    if effects == ALL and s.drag_circle > 0.0:
         s.drag_push, s.drag_side = _drag(
             s, s.drag_push, s.drag_side, s.drag_circle, c.drag_mass, c.drag_ahead, c.drag_left, c
         )
@@ -68,9 +69,9 @@ def sweep(s: Any, c: Any, effects: bool = True, terms: bool = False, first: bool
 
 
 @kernel
-def sweep_on(s: Any, c: Any, effects: bool, terms: bool = False) -> None:
+def sweep_on(s: Any, c: Any, effects: int, terms: bool = False) -> None:
     """Sweep once or twice more; arguments as in `sweep`. Loads on wheels behind a play follow the impulses found."""
-    plays = effects and (c.left_gap > 0.0 or c.right_gap > 0.0)
+    plays = effects == ALL and (c.left_gap > 0.0 or c.right_gap > 0.0)
     if plays:
         _shift_loads(s, c, False)
     if not sweep(s, c, effects, terms):
@@ -101,7 +102,7 @@ def rub_shafts(s: Any, c: Any) -> bool:
 
 
 @kernel
-def _roll(s: Any, c: Any, effects: bool, first: bool) -> bool:
+def _roll(s: Any, c: Any, effects: int, first: bool) -> bool:
     """Give both tyres the impulses that would end their slip, within their friction circles.
 
     Returns
@@ -110,7 +111,7 @@ def _roll(s: Any, c: Any, effects: bool, first: bool) -> bool:
         Whether a tyre slides, or the gears have play: another sweep is then needed.
     """
     left_slip, right_slip, side_slip = _slips(s, c)
-    plays_l, plays_r = effects and c.left_gap > 0.0, effects and c.right_gap > 0.0
+    plays_l, plays_r = effects == ALL and c.left_gap > 0.0, effects == ALL and c.right_gap > 0.0
     end_l, end_r = left_slip, right_slip
     if plays_l:
         end_l = separation(left_slip, s.left_push, s.left_play, c.left_gap, c.left_radius, c)

@@ -31,7 +31,7 @@ from gecar.world.kernel.lock_step import (
     store_state,
 )
 from gecar.world.kernel.sensing import RING, delayed
-from gecar.world.kernel.state import place
+from gecar.world.kernel.state import ALL, PLAIN, place
 
 # What a lane carries beside its robot: the commands of this step and the one before, after the cap; the tile; the step,
 # the one the program or the time limit waits for, and whether something has to be done now: then, or on another tile.
@@ -105,7 +105,7 @@ def make_memory() -> Memory:
     )
 
 
-def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901
+def _drive_lanes_kernel(effects: int) -> Any:  # noqa: C901
     """Return the compiled `drive_lanes` for robots with effects, or for plain ones; compiled when first called.
 
     All loops over the lanes stand in this one function, with ``effects`` a constant: LLVM makes them vector code.
@@ -162,7 +162,7 @@ def _drive_lanes_kernel(effects: bool) -> Any:  # noqa: C901
     return kernel(drive_lanes)
 
 
-_drive_plain, _drive_any = _drive_lanes_kernel(effects=False), _drive_lanes_kernel(effects=True)
+_drive_plain, _drive_any = _drive_lanes_kernel(PLAIN), _drive_lanes_kernel(ALL)
 
 
 def drive_lanes(jobs: Jobs, under: Conditions, floor: Floor, memory: Memory, ends: Ends) -> None:

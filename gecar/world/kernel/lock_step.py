@@ -18,7 +18,7 @@ from gecar.world.effects import PHYSICS
 from gecar.world.kernel.contacts import sweep_on
 from gecar.world.kernel.dynamics import begin_as_asked, begin_step, drift, end_step, enter_step, reshape
 from gecar.world.kernel.laws import N_SCRATCH, VIEW, load_asked, store_view
-from gecar.world.kernel.state import DERIVED, STATE
+from gecar.world.kernel.state import ALL, DERIVED, STATE
 from gecar.world.kernel.terms import ask, look_at
 
 _ZERO = any_integer(0)
@@ -49,7 +49,7 @@ def lane_memory(fields: int, lanes: int) -> npt.NDArray[np.float64]:
 
 
 @kernel
-def advance_lanes(flat: npt.NDArray[np.float64], lanes: int, effects: bool) -> None:
+def advance_lanes(flat: npt.NDArray[np.float64], lanes: int, effects: int) -> None:
     """Advance all lanes by one step under the commands that act, as `gecar.world.kernel.dynamics.step` and `drift` do.
 
     Parameters
@@ -96,7 +96,7 @@ def advance_lanes_with_terms(
         c = load_derived(flat, lanes, lane)
         a = load_acting(flat, lanes, lane)
         v = blank(VIEW)
-        enter_step(s, c, True)
+        enter_step(s, c, ALL)
         look_at(s, a.left, a.right, p, c, v)
         store_state(flat, lanes, lane, s)
         store_view(flat, lanes, lane, v)
@@ -121,11 +121,11 @@ def advance_lanes_with_terms(
         unsettled += 0 if settled else 1
         store_state(flat, lanes, lane, s)
         store_acting(flat, lanes, lane, a)
-    _finish(flat, lanes, True, True, unsettled)
+    _finish(flat, lanes, ALL, True, unsettled)
 
 
 @kernel
-def _finish(flat: npt.NDArray[np.float64], lanes: int, effects: bool, terms: bool, unsettled: int) -> None:
+def _finish(flat: npt.NDArray[np.float64], lanes: int, effects: int, terms: bool, unsettled: int) -> None:
     """Sweep until all contacts are settled, and end the step."""
     if unsettled > 0:
         for lane in range(lanes):

@@ -8,6 +8,7 @@ from typing import Any
 from gecar.compiled import kernel
 from gecar.world.kernel.contacts import rub_shafts
 from gecar.world.kernel.series import decay, sine
+from gecar.world.kernel.state import ALL, PLAIN
 
 # rad/s at a regulated command of 100 %: Motor.run takes 10 deg/s per percent
 FULL_SPEED = math.radians(1000.0)
@@ -19,7 +20,7 @@ STILL = 1e-15  # m/s and rad/s
 
 @kernel
 def conduct(
-    duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any, effects: bool = True
+    duty: float, voltage: float, angle: float, speed: float, p: Any, c: Any, effects: int = ALL
 ) -> float:
     """Return a shaft's speed [rad/s] after the motor's torque, before dry friction and load.
 
@@ -27,9 +28,9 @@ def conduct(
     """
     free = c.keep * speed
     driven = free + c.drive_gain * duty * voltage
-    if not effects:
+    if effects == PLAIN:
         return driven
-    if c.ripple != 0.0:
+    if effects == ALL and c.ripple != 0.0:
         driven += c.ripple * sine(p.ripple_cycles * angle + p.ripple_phase)
     if c.torque != 0.0 or c.lean != 0.0:
         driven += c.torque - c.lean * abs(speed)
@@ -47,18 +48,18 @@ def awake(duty: float, t: float, p: Any, c: Any) -> float:
 
 
 @kernel
-def effective_duty(duty: float, gain: float, dead: float, p: Any, effects: bool = True) -> float:
+def effective_duty(duty: float, gain: float, dead: float, p: Any, effects: int = ALL) -> float:
     """Return the share of the supply that a driver gives a motor of a gain and a dead band.
 
     Besides these: what differs by direction, the driver's curve, and full duty's own gain.
     """
-    if not effects:
+    if effects == PLAIN:
         return duty * gain
     threshold = max(dead + math.copysign(0.5 * p.dead_band_forward, duty), 0.0)
     if abs(duty) < threshold:
         return 0.0
     past = duty - math.copysign(threshold * p.dead_band_offset, duty)
-    if p.duty_bulge != 0.0:
+    if effects == ALL and p.duty_bulge != 0.0:
         past *= (1.0 + p.duty_bulge) / (1.0 + p.duty_bulge * abs(past))
     direction = 1.0 + p.direction_gain if duty > 0.0 else 1.0 - p.direction_gain
     if abs(duty) >= FULL_DUTY:
@@ -76,12 +77,12 @@ def within_current(drive: float, voltage: float, speed: float, p: Any) -> float:
 
 
 @kernel
-def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, effects: bool = True) -> float:
+def friction_budget(speed: float, load: float, radius: float, p: Any, c: Any, effects: int = ALL) -> float:
     """Return the largest impulse [N m s] dry friction can give a shaft in one step."""
     budget = c.sliding
-    if not effects:
+    if effects == PLAIN:
         return budget
-    if p.static_friction != 0.0:
+    if effects == ALL and p.static_friction != 0.0:
         ratio = speed / p.stribeck_speed
         budget += p.static_friction * c.dt * decay(ratio * ratio)
     ratio = p.friction_ratio if speed > 0.0 else -p.friction_ratio
@@ -97,7 +98,7 @@ def run_motors(
     right_torque: float,
     p: Any,
     c: Any,
-    effects: bool,
+    effects: int,
 ) -> None:
     """Turn commands, and torques [N m] beside the motors', into the shafts' free speeds, at the step's voltage.
 
@@ -108,10 +109,10 @@ def run_motors(
     left_stood, right_stood = s.left_before == 0.0, s.right_before == 0.0
     s.left_before, s.right_before = s.left_speed, s.right_speed
     left_sudden = right_sudden = 1.0
-    if effects:
-        if p.regulated != 0.0:
-            left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
-            right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
+    if effects != PLAIN and p.regulated != 0.0:
+        left_duty, s.left_integral = regulate(left_duty, s.left_speed, s.left_integral, c)
+        right_duty, s.right_integral = regulate(right_duty, s.right_speed, s.right_integral, c)
+    if effects == ALL:
         left_duty, right_duty = awake(left_duty, s.t, p, c), awake(right_duty, s.t, p, c)
         if p.command_slew < math.inf:
             s.left_began, s.left_duty, s.left_mean, acts, left_sudden = ramped(
@@ -124,7 +125,7 @@ def run_motors(
             s.right_earlier_command, s.right_command, right_duty = s.right_command, right_duty, acts
     s.left_drive = effective_duty(left_duty, c.left_gain, c.left_dead, p, effects)
     s.right_drive = effective_duty(right_duty, c.right_gain, c.right_dead, p, effects)
-    if effects:
+    if effects == ALL:
         s.left_drive = within_current(s.left_drive, s.voltage, s.left_speed, p)
         s.right_drive = within_current(s.right_drive, s.voltage, s.right_speed, p)
     left = conduct(s.left_drive, s.voltage, s.left_angle, s.left_speed, p, c, effects)
@@ -323,7 +324,7 @@ def turn_bare_shafts(
     c: Any,
 ) -> None:
     """Advance both shafts by one step at the step's voltage; torques and frictions [N m] may act beside the motor's."""
-    run_motors(s, left_duty, right_duty, left_torque, right_torque, p, c, True)
+    run_motors(s, left_duty, right_duty, left_torque, right_torque, p, c, ALL)
     s.left_dry = max(friction_budget(s.left_speed, 0.0, 0.0, p, c) + left_friction * c.dt, 0.0)
     s.right_dry = max(friction_budget(s.right_speed, 0.0, 0.0, p, c) + right_friction * c.dt, 0.0)
     s.left_friction = s.right_friction = 0.0
