@@ -177,6 +177,15 @@ def _shift_loads(s: Any, c: Any, aside: bool) -> None:
 
 
 @kernel
+def impulses_on_body(s: Any) -> tuple[float, float]:
+    """Return the impulses [N s] that all contacts give the body, ahead and to the left."""
+    return (
+        s.left_push + s.right_push + s.caster_push + s.drag_push,
+        s.left_side + s.right_side + s.caster_side + s.drag_side,
+    )
+
+
+@kernel
 def caster_load(ahead: float, c: Any) -> float:
     """Return the load on the caster [N] under a force ahead [N]: its share of the weight, and what the force shifts."""
     return min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight)

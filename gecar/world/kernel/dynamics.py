@@ -19,6 +19,7 @@ import numpy.typing as npt
 from gecar.compiled import blank, kernel, subroutine
 from gecar.world.kernel.contacts import (
     caster_load,
+    impulses_on_body,
     release_contacts,
     repay_tyres,
     shove,
@@ -319,8 +320,8 @@ def _set_budgets(s: Any, p: Any, c: Any, effects: int) -> None:
     Loads are static, plus transfer from the last step's contact impulses: fore-aft onto the caster, sideways from
     wheel to wheel.
     """
-    s.caster_load = caster_load((s.left_push + s.right_push + s.caster_push + s.drag_push) * c.inv_dt, c)
-    s.aside = s.left_side + s.right_side + s.caster_side + s.drag_side
+    ahead, s.aside = impulses_on_body(s)
+    s.caster_load = caster_load(ahead * c.inv_dt, c)
     left, right = wheel_loads(s.caster_load, s.aside * c.inv_dt, c)
     s.left_bears, s.right_bears = left, right
     s.left_dry = friction_budget(s.left_speed, left, c.left_radius, p, c, effects)

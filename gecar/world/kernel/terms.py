@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import any_integer, blank, kernel, subroutine
+from gecar.world.kernel.contacts import caster_load, impulses_on_body, wheel_loads
 from gecar.world.kernel.laws import (
     ASKED_FIELDS,
     ASKED_OF_PORT,
@@ -93,9 +94,7 @@ def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v
     v
         Record of dtype `VIEW`, overwritten.
     """
-    ahead = (s.left_push + s.right_push + s.caster_push + s.drag_push) * c.inv_dt
-    aside = (s.left_side + s.right_side + s.caster_side + s.drag_side) * c.inv_dt
-    wheel = 0.5 * (c.weight - min(max(c.caster_static + ahead * c.caster_arm, 0.0), c.weight))
+    ahead, aside = impulses_on_body(s)
     v.left_time = v.right_time = s.t
     v.left_voltage = v.right_voltage = s.voltage if s.t > 0.0 else p.voltage * p.supply_scale
     v.left_ahead = v.right_ahead = s.u
@@ -116,8 +115,7 @@ def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v
     v.right_current = motor_current(s.right_drive, s.voltage, s.right_speed, p)
     draw = max(s.left_drive * v.left_current, 0.0) + max(s.right_drive * v.right_current, 0.0)
     v.left_draw = v.right_draw = draw
-    v.left_load = min(max(wheel - aside * c.transfer_side, 0.0), 2.0 * wheel)
-    v.right_load = min(max(wheel + aside * c.transfer_side, 0.0), 2.0 * wheel)
+    v.left_load, v.right_load = wheel_loads(caster_load(ahead * c.inv_dt, c), aside * c.inv_dt, c)
     v.left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
     v.right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
     v.left_side, v.right_side = -1.0, 1.0
