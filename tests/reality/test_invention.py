@@ -200,6 +200,13 @@ def test_a_part_that_left_out_recordings_do_not_ask_for_is_dropped():
     assert [term.law for term in simplified(library, law)[0].terms] == ["c1 * speed * abs(speed)"]
 
 
+def test_a_language_without_laws_of_what_was_measured_finds_none_and_says_so():
+    told = list[str]()
+    language = parse_grammar("<t> ::= motor_torque: a")
+    assert search(library_on([recorded(EV3, 0)]), language, ["colour_reading"], tell=told.append) == []
+    assert told == [f"{language.source} has no law of what is left here: none at colour_reading"]
+
+
 def test_a_form_that_the_grid_of_points_hides_is_found_at_the_point_of_another():
     """A camera's lens, of the third power: from the only point where the grid has it, its fit ends elsewhere."""
     runs, at = [], np.array([1.2, 0.3])

@@ -258,6 +258,9 @@ def search(
     """
     room = N_TERMS - len(library.problem.estimator.robot.term)
     there = at_ports(grammar, ports, room)
+    if there is None:
+        tell(f"{grammar.source} has no law of what is left here: none at {', '.join(ports)}")
+        return []
     singles = [laws for laws in single_laws(there) if not variables_of(laws) & unknown]
     if not singles:
         return []
@@ -272,7 +275,7 @@ def search(
     of_wheels = {laws[0].port: laws for laws in reversed(ordered) if _is_of_each_wheel(laws)}
     kept = [*ordered[:KEPT_LAWS], *of_wheels.values()]
     tell(f"laws evolved at {', '.join(port for port in ports if port in promising)}")
-    evolved = _evolved(library, at_ports(there, sorted(promising)), seed, unknown)
+    evolved = _evolved(library, at_ports(there, sorted(promising)) or there, seed, unknown)
     candidates = {key(laws): laws for laws in (*_greedy_sums(library, kept), *evolved, *kept)}
     ranked = sorted(candidates.values(), key=lambda laws: _loss(library, laws))
     fitted = [fit(library, library.started(laws)) for laws in _spread_over_ports(ranked)]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from gecar.errors import InputError, expected
+from gecar.errors import InputError
 from gecar.language.grammar import Grammar, load_grammar
 from gecar.world.ports import N_TERMS
 from gecar.world.terms import POINT, Term
@@ -203,20 +203,10 @@ def _expanded(grammar: Grammar, parts: Sequence[str | int], left: int) -> Iterat
     yield "".join(str(part) for part in parts)
 
 
-def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Grammar:
-    """Return a grammar of laws at some ports alone, at so many at once at the most.
-
-    Raises
-    ------
-    InputError
-        If it has none there.
-    """
+def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Grammar | None:
+    """Return a grammar of laws at some ports alone, at so many at once at the most; None if it has none there."""
     numbers = [k for k, names in enumerate(_ports_of(grammar)) if len(names) <= most and names <= set(ports)]
-    if not numbers:
-        raise expected(
-            grammar.source, "no law that can show in these recordings", f"laws at {', '.join(ports)}"
-        )
-    return _only(grammar, numbers)
+    return _only(grammar, numbers) if numbers else None
 
 
 def elsewhere(grammar: Grammar, ports: Sequence[str]) -> Grammar | None:
