@@ -195,7 +195,7 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
     was, now = _gaps(problem, without, explained.taken, held)
     whole_drives = problem, without, explained.taken, sizes
-    continues = _continues(held, problem.residuals)
+    continues = is_end_of_the_only_one(held, problem.residuals)
     most = was / WORSE if continues else WORSE * was
     if now > most and not (held.sensor or problem.on_bench):
         if continues or not share.is_whole:
@@ -213,7 +213,7 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     return now < was and is_steady and not worsens(*whole_drives)
 
 
-def _continues(held: Residuals, fitted: Residuals) -> bool:
+def is_end_of_the_only_one(held: Residuals, fitted: Residuals) -> bool:
     """Whether what is set aside is the end of the only recording."""
     alone = len(held.recordings) == len(fitted.recordings) == 1
     return alone and held.recordings[0].recording.name == fitted.recordings[0].recording.name
