@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.linear_case import EV3, bumps, linear, linear_problem
+from support.linear_case import bumps, linear, linear_problem
 
 from gecar.reality.uncertainty import limits as limits_of
 from gecar.reality.uncertainty.limits import limits
@@ -77,17 +77,3 @@ def test_an_effect_whose_law_may_be_off_has_a_larger_limit(monkeypatch):
     off = limit_of({VISCOUS: 9.0 * OWN}, 9.0 * HELD).size
     assert off / BY_ID[VISCOUS].parameters[0].worthwhile == pytest.approx(1.15 * (1.96 + 1.645), rel=0.03)
     assert usual < 0.6 * off
-
-
-def test_the_end_of_the_only_recording_must_come_much_nearer(monkeypatch):
-    usual = limit_of({VISCOUS: OWN}, HELD).size
-
-    def gaps(*contenders):  # a quarter more at three times the usual limit
-        added = [
-            c.robot.physics["viscous_friction"][0] - EV3.physics["viscous_friction"][0] for c in contenders
-        ]
-        return [1.0 + abs(size) / (12.0 * usual) for size in added]
-
-    monkeypatch.setattr(limits_of, "gaps", gaps)
-    monkeypatch.setattr(limits_of, "is_end_of_the_only_one", lambda held, fitted: True)
-    assert limit_of({VISCOUS: OWN}, HELD).size == pytest.approx(1.15 * 3.0 * usual, rel=0.1)

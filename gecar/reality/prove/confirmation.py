@@ -185,7 +185,8 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     None may take all channels together a quarter farther off, whatever small changes would make up for it; unless all
     of it is asked for, and drives are then off by less than is material: of so little a few times as much is nothing.
     Where only the end of the one recording is set aside, they must come a quarter nearer: nothing else tests whether
-    what fits its beginning is a cause.
+    what fits its beginning is a cause. There each is judged with the small changes that it asks for, or what a robot is
+    off its file by would add up to far more than an effect does in so short a part.
     They must come out much better where much is unexplained, unless all of the effect is asked for: what imitates has
     not the same size elsewhere, and a cause may be known better than where a drive ends that it has sent astray. Then
     it is enough, too, that all channels together are nearer: other errors may end one drive of few at the right place.
@@ -193,9 +194,9 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     but not much: a ripple of the torque hardly shows where a drive ends that gusts have pushed about.
     """
     problem, sizes = explained.problem, explained.problem.sizes.of(held)
-    was, now = _gaps(problem, without, explained.taken, held)
     whole_drives = problem, without, explained.taken, sizes
-    continues = is_end_of_the_only_one(held, problem.residuals)
+    continues = _continues(held, problem.residuals)
+    was, now = _gaps(problem, without, explained.taken, held, continues)
     most = was / WORSE if continues else WORSE * was
     if now > most and not (held.sensor or problem.on_bench):
         if continues or not share.is_whole:
@@ -213,16 +214,22 @@ def _helps(explained: Explanation, held: Residuals, step: Step, without: Model, 
     return now < was and is_steady and not worsens(*whole_drives)
 
 
-def is_end_of_the_only_one(held: Residuals, fitted: Residuals) -> bool:
+def _continues(held: Residuals, fitted: Residuals) -> bool:
     """Whether what is set aside is the end of the only recording."""
     alone = len(held.recordings) == len(fitted.recordings) == 1
     return alone and held.recordings[0].recording.name == fitted.recordings[0].recording.name
 
 
-def _gaps(problem: Problem, without: Model, with_effect: Model, held: Residuals) -> tuple[float, float]:
-    """Return how far whole drives set aside are off without an effect and with it, as `gaps` does."""
+def _gaps(
+    problem: Problem, without: Model, with_effect: Model, held: Residuals, changed: bool
+) -> tuple[float, float]:
+    """Return how far whole drives set aside are off without an effect and with it, as `gaps` does.
+
+    Each model has the small changes that it asks for, if it is to be ``changed`` so.
+    """
+    values = [problem.small_changes(m) if changed else m.values for m in (without, with_effect)]
     robot, held = problem.estimator.robot, problem.with_its_camera(held, without.physics)
-    return gaps(*(Contender(robot.with_effects(m.values), held) for m in (without, with_effect)))
+    return gaps(*(Contender(robot.with_effects(each), held) for each in values))
 
 
 def with_better_readings(seen: Confirmation, held: Residuals) -> Confirmation:

@@ -7,8 +7,7 @@ times its root. The limit is the size, worth a name and material, at which in 95
 - that passes the price of a name,
 - it gains more than any other effect would in its place,
 - its interval excludes neutral, though the simulation's own law for it is a little off,
-- the recordings set aside confirm it beside the small changes that make up for it in those fitted on; where they are
-  the end of the only recording, that comes as much nearer as is asked for.
+- the recordings set aside confirm it beside the small changes that make up for it in those fitted on.
 
 A patch's limit holds for nine of ten places where the robot has been.
 
@@ -31,13 +30,11 @@ from gecar.reality.fitting.initial_values import patches
 from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.optimisation.least_squares import costs
-from gecar.reality.prove.confirmation import is_end_of_the_only_one
-from gecar.reality.prove.holdout import Contender, gaps
 from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.selection.acceptance import worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import LEAST_SHOWN, least_share_expected
-from gecar.reality.selection.thresholds import PRICE, WORSE
+from gecar.reality.selection.thresholds import PRICE
 from gecar.reality.uncertainty.intervals import NORMAL_95, model_error
 from gecar.reality.verdict import Limit
 from gecar.world.effects import BY_ID
@@ -240,19 +237,7 @@ class _Search:
         if least > 0.0:
             made_up = (yield _Asked(held, problem.with_changes_for(self._model, -change)))[0]
             least = min(least, least_share_expected(held.index, noise, after - made_up, SURE))
-        return min(1.0 / (1.0 - least), self._nearer(z))
-
-    def _nearer(self, z: Array) -> float:
-        """Return by which factor a size takes the end of the only recording farther off than it needs; infinite: any.
-
-        Without an effect that is there, that end is as far off as with one that is not.
-        """
-        problem, held = self._problem, self._held.residuals
-        if held.sensor or problem.on_bench or not is_end_of_the_only_one(held, problem.residuals):
-            return math.inf
-        values = (self._parameters.values(z), self._model.values)
-        was, now = gaps(*(Contender(problem.estimator.robot.with_effects(each), held) for each in values))
-        return was / max(WORSE * now, FAINT)
+        return 1.0 / (1.0 - least)
 
     def _matters(self, z: Array) -> bool:
         """Whether a size is worth a name and material."""
