@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.linear_case import bumps, linear, linear_problem
+from support.linear_case import EV3, LinearSizes, bumps, linear, linear_problem
 
+from gecar.reality.materiality import Size
 from gecar.reality.uncertainty import limits as limits_of
 from gecar.reality.uncertainty.limits import limits
 from gecar.world.effects import BY_ID
@@ -68,6 +69,22 @@ def test_what_one_recording_alone_may_show_must_show_in_two_of_its_thirds():
 
     assert limit([1.0, 0.0, 1.0]) is not None
     assert limit([0.0, 1.0, 0.0]) is None
+
+
+def test_what_small_things_make_up_for_has_a_larger_limit(monkeypatch):
+    """A supply was refused, as motors that pull ahead made up for it until it was found."""
+    usual = limit_of({VISCOUS: OWN}, HELD).size
+    apart_mm = 10.0 * np.sqrt(np.mean(OWN**2)) * usual / BY_ID[VISCOUS].parameters[0].worthwhile
+
+    def limit(way):
+        def left(sizes, physics, *_, **__):
+            return Size(mm_1m=abs(apart_mm - way * sizes.apart(EV3.physics, physics).mm_1m))
+
+        monkeypatch.setattr(LinearSizes, "left", left)
+        return limit_of({VISCOUS: OWN}, HELD).size
+
+    assert limit(1.0) == pytest.approx(usual, rel=0.01)
+    assert limit(-1.0) > 1.6 * usual
 
 
 def test_an_effect_whose_law_may_be_off_has_a_larger_limit(monkeypatch):

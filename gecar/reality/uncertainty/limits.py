@@ -4,6 +4,7 @@ An effect of a certain size is added to the robot found. What that changes in th
 changes of all constants and in units of the noise, is what it would gain: half its square, give or take a normal number
 times its root. The limit is the size, worth a name and material, at which in 95 of 100 cases
 
+- whole drives come out no worse with it, though what they are off by without it may have made up for a part,
 - that passes the price of a name,
 - it gains more than any other effect would in its place,
 - its interval excludes neutral, though the simulation's own law for it is a little off,
@@ -34,7 +35,7 @@ from gecar.reality.residuals.of_case import Physics, Residuals
 from gecar.reality.selection.acceptance import worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import LEAST_SHOWN, least_share_expected
-from gecar.reality.selection.thresholds import PRICE
+from gecar.reality.selection.thresholds import PRICE, WORSE
 from gecar.reality.uncertainty.intervals import NORMAL_95, model_error
 from gecar.reality.verdict import Limit
 from gecar.world.effects import BY_ID
@@ -68,7 +69,8 @@ def limits(problem: Problem, model: Model, held: Residuals) -> dict[str, Limit |
     filmed = problem.with_its_camera(held, model.physics)
     aside = _Held(filmed, filmed.errors(model.physics), filmed.errors(problem.with_small_changes(model)))
     none = problem.residuals.errors(model.physics)
-    searches = [_Search(problem, model, none, aside, rivals, effect) for effect in others]
+    left = problem.material.times(problem.sizes.left(model.physics))
+    searches = [_Search(problem, model, none, left, aside, rivals, effect) for effect in others]
     sizes = iter(_in_step([each for search in searches for each in search.of_each_place_and_side()]))
     return {search.effect: search.limit(sizes) for search in searches}
 
@@ -120,6 +122,8 @@ class _Search:
         As `limits` takes them.
     none
         The model's residuals in units of the sensors' noise, shape (n,).
+    left
+        What whole drives are off by under the model, in times the material size.
     held
         The recordings set aside.
     rivals
@@ -133,11 +137,13 @@ class _Search:
         problem: Problem,
         model: Model,
         none: Array,
+        left: float,
         held: _Held,
         rivals: Mapping[str, Array],
         effect: str,
     ) -> None:
         self._problem, self._model, self._none, self._held, self.effect = problem, model, none, held, effect
+        self._left = left
         self._rivals = [directions for other, directions in rivals.items() if other != effect]
         self._parameters = free(problem.estimator.robot, (*model.effects, effect))
         coordinates = self._parameters.coordinates
@@ -240,11 +246,30 @@ class _Search:
         return 1.0 / (1.0 - least)
 
     def _matters(self, z: Array) -> bool:
-        """Whether a size is worth a name and material."""
+        """Whether a size is worth a name and material, and whole drives would come out no worse with it."""
         problem, parameters = self._problem, self._parameters
         if not worthwhile(parameters, z, self.effect, problem.share):
             return False
-        return problem.sizes.are_apart(self._model.physics, parameters.physics(z), problem.material)
+        physics = parameters.physics(z)
+        if not problem.sizes.are_apart(self._model.physics, physics, problem.material):
+            return False
+        placed = BY_ID[self.effect].at_a_place
+        return (
+            self._left <= 1.0
+            or problem.on_bench
+            or placed
+            or self._left <= WORSE * self._would_leave(physics)
+        )
+
+    def _would_leave(self, physics: Physics) -> float:
+        """Return what drives with an effect of one size would be off by under the model, in times the material size.
+
+        As vectors they are off by b without it, and it adds e: by the parallelogram |b + e|² = 2 |b|² + 2 |e|² - |b -
+        e|², the last of which is what the robot with the effect is off by in drives without it.
+        """
+        sizes, times = self._problem.sizes, self._problem.material.times
+        own, opposite = times(sizes.apart(self._model.physics, physics)), times(sizes.left(physics))
+        return math.sqrt(max(2.0 * (self._left**2 + own**2) - opposite**2, 0.0))
 
 
 def _between(sizes: Array, before: float, now: float) -> float:
