@@ -476,18 +476,6 @@ def replay_rows(
     play = _replay_one if lanes == 1 else several
     alike = lanes > 1 and len(set(formulas_of(physics))) == 1
     light = bool(is_light(physics).all())
-    flat, stores = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(N_STORES * lanes)
-    play(
-        inputs,
-        np.ascontiguousarray(physics),
-        start,
-        offset,
-        dt,
-        flat,
-        np.zeros(4),
-        stores,
-        kept,
-        alike,
-        light,
-    )
+    memory = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(4), np.zeros(N_STORES * lanes)
+    play(inputs, np.ascontiguousarray(physics), start, offset, dt, *memory, kept, alike, light)
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

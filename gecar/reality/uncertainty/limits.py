@@ -253,13 +253,8 @@ class _Search:
         physics = parameters.physics(z)
         if not problem.sizes.are_apart(self._model.physics, physics, problem.material):
             return False
-        placed = BY_ID[self.effect].at_a_place
-        return (
-            self._left <= 1.0
-            or problem.on_bench
-            or placed
-            or self._left <= WORSE * self._would_leave(physics)
-        )
+        unasked = self._left <= 1.0 or problem.on_bench or BY_ID[self.effect].at_a_place
+        return unasked or self._left <= WORSE * self._would_leave(physics)
 
     def _would_leave(self, physics: Physics) -> float:
         """Return what drives with an effect of one size would be off by under the model, in times the material size.
