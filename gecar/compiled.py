@@ -21,7 +21,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from llvmlite import ir
-from numba.core import caching, cgutils, codegen, types
+from numba.core import caching, cgutils, types
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
@@ -96,11 +96,6 @@ class _Index(_NumbasIndex):  # type: ignore[misc]
 
 CACHE = _cache_folder()
 setattr(numba.config, "CACHE_DIR", str(CACHE))  # noqa: B010 - numba declares its settings at run time
-_features: str = codegen.get_host_cpu_features()  # type: ignore[no-untyped-call]
-if "+avx512f" in _features and not os.environ.get("NUMBA_CPU_FEATURES"):
-    # LLVM would use half of a vector there, lest a processor lower its clock: with all of it a step of eight robots at
-    # once takes a fourth less time.
-    setattr(numba.config, "CPU_FEATURES", f"{_features},-prefer-256-bit")  # noqa: B010
 setattr(caching, "IndexDataCacheFile", _Index)  # noqa: B010
 
 
