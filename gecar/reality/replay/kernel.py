@@ -284,7 +284,7 @@ def _act(left: float, right: float, flat: Array, lanes: int) -> None:
 
 @kernel
 def _advance(left: float, right: float, bench: bool, light: bool, flat: Array, lanes: int) -> None:
-    """Advance every lane by one step under the same commands; ``light`` as `gecar.world.kernel.dynamics.is_light`."""
+    """Advance every lane by one step under the same commands; ``light`` says whether all lanes' robots are light."""
     if bench:
         for lane in range(lanes):
             s = load_state(flat, lanes, lane)
@@ -475,7 +475,7 @@ def replay_rows(
     several = _replay_lanes_with_terms if has_terms(physics).any() else _replay_lanes
     play = _replay_one if lanes == 1 else several
     alike = lanes > 1 and len(set(formulas_of(physics))) == 1
-    light = bool(is_light(physics).all())
+    light = lanes > 1 and bool(is_light(physics).all())
     memory = lane_memory(N_REPLAY_FIELDS, lanes), np.zeros(4), np.zeros(N_STORES * lanes)
     play(inputs, np.ascontiguousarray(physics), start, offset, dt, *memory, kept, alike, light)
     return Kept(*(array.reshape(*shape, lanes) for array, shape in zip(kept, shapes, strict=True)))

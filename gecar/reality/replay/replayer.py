@@ -300,6 +300,9 @@ def _in_step(physics: npt.NDArray[Any], numbers: npt.NDArray[np.int_], bench: bo
     Light robots are kept apart from others, which take twice as long. Those whose laws differ in constants alone
     stand side by side. Few are replayed one by one, and so are motors with laws.
     """
+    if len(numbers) < FEWEST_LANES:
+        yield from ([int(number)] for number in numbers)
+        return
     robots = physics[numbers]
     keys: list[Any] = list(zip(robots[list(TIMING)].tolist(), is_light(robots).tolist(), strict=True))
     laws = [b""] * len(robots)
