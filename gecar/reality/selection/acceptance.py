@@ -86,7 +86,11 @@ def worsens(problem: Problem, without: Model, with_effect: Model, sizes: Sizes |
         Under the commands of which recordings; default: those fitted on.
     """
     left = (sizes or problem.sizes).left
-    before, now = (problem.material.times(left(model.physics)) for model in (without, with_effect))
+    return is_worse(*(problem.material.times(left(model.physics)) for model in (without, with_effect)))
+
+
+def is_worse(before: float, now: float) -> bool:
+    """Whether drives are off by a quarter more than before, and materially; both in times the material size."""
     return now > max(WORSE * before, 1.0)
 
 

@@ -4,11 +4,11 @@ An effect of a certain size is added to the robot found. What that changes in th
 changes of all constants and in units of the noise, is what it would gain: half its square, give or take a normal number
 times its root. The limit is the size, worth a name and material, at which in 95 of 100 cases
 
-- whole drives come out no worse with it, though what they are off by without it may have made up for a part,
 - that passes the price of a name,
 - it gains more than any other effect would in its place,
 - its interval excludes neutral, though the simulation's own law for it is a little off,
-- the recordings set aside confirm it beside the small changes that make up for it in those fitted on.
+- the recordings set aside confirm it beside the small changes that make up for it in those fitted on,
+- whole drives come out no worse with it, though other small things may have made up for a part of it before.
 
 A patch's limit holds for nine of ten places where the robot has been.
 
@@ -32,10 +32,10 @@ from gecar.reality.fitting.model import Model
 from gecar.reality.fitting.parameters import free
 from gecar.reality.optimisation.least_squares import costs
 from gecar.reality.residuals.of_case import Physics, Residuals
-from gecar.reality.selection.acceptance import worthwhile
+from gecar.reality.selection.acceptance import is_worse, worthwhile
 from gecar.reality.selection.problem import Problem
 from gecar.reality.selection.share import LEAST_SHOWN, least_share_expected
-from gecar.reality.selection.thresholds import PRICE, WORSE
+from gecar.reality.selection.thresholds import PRICE
 from gecar.reality.uncertainty.intervals import NORMAL_95, model_error
 from gecar.reality.verdict import Limit
 from gecar.world.effects import BY_ID
@@ -144,6 +144,8 @@ class _Search:
     ) -> None:
         self._problem, self._model, self._none, self._held, self.effect = problem, model, none, held, effect
         self._left = left
+        # Drives that are off by little come out no worse, whatever they were off by before.
+        self._may_worsen = is_worse(0.0, left) and not (problem.on_bench or BY_ID[effect].at_a_place)
         self._rivals = [directions for other, directions in rivals.items() if other != effect]
         self._parameters = free(problem.estimator.robot, (*model.effects, effect))
         coordinates = self._parameters.coordinates
@@ -253,14 +255,13 @@ class _Search:
         physics = parameters.physics(z)
         if not problem.sizes.are_apart(self._model.physics, physics, problem.material):
             return False
-        unasked = self._left <= 1.0 or problem.on_bench or BY_ID[self.effect].at_a_place
-        return unasked or self._left <= WORSE * self._would_leave(physics)
+        return not (self._may_worsen and is_worse(self._would_leave(physics), self._left))
 
     def _would_leave(self, physics: Physics) -> float:
-        """Return what drives with an effect of one size would be off by under the model, in times the material size.
+        """Return how far drives of a robot with the effect would be from the model, in times the material size.
 
-        As vectors they are off by b without it, and it adds e: by the parallelogram |b + e|² = 2 |b|² + 2 |e|² - |b -
-        e|², the last of which is what the robot with the effect is off by in drives without it.
+        They are off by b without it, and by b + e with it. By the parallelogram |b + e|² = 2 |b|² + 2 |e|² - |b - e|²,
+        and b - e is how far the drives that were measured are from a simulated robot with it.
         """
         sizes, times = self._problem.sizes, self._problem.material.times
         own, opposite = times(sizes.apart(self._model.physics, physics)), times(sizes.left(physics))
