@@ -110,7 +110,7 @@ def _roll(s: Any, c: Any, effects: int, first: bool) -> bool:
     bool
         Whether a tyre slides, or the gears have play: another sweep is then needed.
     """
-    left_slip, right_slip, side_slip = _slips(s, c)
+    left_slip, right_slip, side_slip = slips(s, c)
     plays_l, plays_r = effects == ALL and c.left_gap > 0.0, effects == ALL and c.right_gap > 0.0
     end_l, end_r = left_slip, right_slip
     if plays_l:
@@ -201,7 +201,7 @@ def wheel_loads(caster: float, aside: float, c: Any) -> tuple[float, float]:
 
 
 @kernel
-def _slips(s: Any, c: Any) -> tuple[float, float, float]:
+def slips(s: Any, c: Any) -> tuple[float, float, float]:
     """Return the slips [m/s] of the left and the right tyre along the robot, and of both to the side."""
     left = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
     right = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
@@ -251,7 +251,7 @@ def separation(slip: float, push: float, play: float, gap: float, radius: float,
 @kernel
 def _meet(s: Any, c: Any) -> None:
     """Set for what share of the step tyres behind a play can pull."""
-    left_slip, right_slip, _ = _slips(s, c)
+    left_slip, right_slip, _ = slips(s, c)
     if c.left_gap > 0.0:
         end = separation(left_slip, 0.0, s.left_play, c.left_gap, c.left_radius, c)
         s.left_closed, s.left_opened = _closed(left_slip, end, s.left_play, c.left_gap, s.left_opened)
@@ -347,7 +347,7 @@ def repay_tyres(s: Any, c: Any) -> None:
     s.left_earlier, s.right_earlier = s.left_latest, s.right_latest
     s.left_latest, s.right_latest = s.left_push, s.right_push
     s.left_asked, s.right_asked = s.left_asks, s.right_asks
-    left_slip, right_slip, side_slip = _slips(s, c)
+    left_slip, right_slip, side_slip = slips(s, c)
     left, right = _hold(left_slip, right_slip, side_slip, c)
     # What is left of earlier slips is no part of what motors ask for.
     s.left_asks, s.right_asks = -left, -right

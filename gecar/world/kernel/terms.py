@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gecar.compiled import any_integer, blank, kernel, subroutine
-from gecar.world.kernel.contacts import caster_load, impulses_on_body, wheel_loads
+from gecar.world.kernel.contacts import caster_load, impulses_on_body, slips, wheel_loads
 from gecar.world.kernel.laws import (
     ASKED_FIELDS,
     ASKED_OF_PORT,
@@ -116,8 +116,7 @@ def look_at(s: Any, left_command: float, right_command: float, p: Any, c: Any, v
     draw = max(s.left_drive * v.left_current, 0.0) + max(s.right_drive * v.right_current, 0.0)
     v.left_draw = v.right_draw = draw
     v.left_load, v.right_load = wheel_loads(caster_load(ahead * c.inv_dt, c), aside * c.inv_dt, c)
-    v.left_slip = s.left_speed * c.left_radius - (s.u - s.yaw_rate * c.half_track)
-    v.right_slip = s.right_speed * c.right_radius - (s.u + s.yaw_rate * c.half_track)
+    v.left_slip, v.right_slip, _ = slips(s, c)
     v.left_side, v.right_side = -1.0, 1.0
 
 
