@@ -46,7 +46,7 @@ class Model:
 
     @property
     def robot(self) -> Robot:
-        """The robot with these effects, and the laws it has."""
+        """The robot with the model's effects; its laws stay."""
         return self.parameters.robot.with_effects(self.values)
 
     @property

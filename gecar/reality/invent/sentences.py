@@ -204,7 +204,7 @@ def _expanded(grammar: Grammar, parts: Sequence[str | int], left: int) -> Iterat
 
 
 def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Grammar | None:
-    """Return a grammar of laws at some ports alone, at so many at once at the most; None if it has none there."""
+    """Return the part of a grammar whose laws act at some ports alone, at most so many at once; None if it has none."""
     numbers = [k for k, names in enumerate(_ports_of(grammar)) if len(names) <= most and names <= set(ports)]
     return _only(grammar, numbers) if numbers else None
 

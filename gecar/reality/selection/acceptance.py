@@ -114,7 +114,7 @@ def rank(step: Step) -> float:
 
 
 def lead(found: Step, rival: str) -> float:
-    """Return by how much less a rival must cost to replace an effect; by `UNPLACED` it may cost more."""
+    """Return by how much less a rival must cost to replace an effect; its rival of `UNPLACED` may even cost more."""
     unplaced, _ = UNPLACED.get(found.effect, ("", 0))
     return -_place_costs(found.effect) if unplaced == rival else found.null_95
 

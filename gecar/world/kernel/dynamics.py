@@ -65,7 +65,7 @@ def is_plain(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
 
 
 def is_light(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Return whether robots have no terms, and none of the effects that take long, shape (n,).
+    """Return whether robots are light: without terms, and without the effects that take long in a step, shape (n,).
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def is_light(physics: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
 def _are_without(
     physics: npt.NDArray[Any], fields: tuple[str, ...], limits: tuple[str, ...]
 ) -> npt.NDArray[np.bool_]:
-    """Return whether none of some fields, nor any of some limits, acts, shape (n,)."""
+    """Return whether robots have neither effects of some fields nor some limits, shape (n,)."""
     without = np.ones(len(physics), bool)
     for field in fields:
         without &= physics[field] == 0.0
