@@ -176,3 +176,31 @@ def test_written_and_read_back_is_the_same(tmp_path_factory, columns, notes, cap
     assert read.setup == written.setup
     for field, _ in COLUMNS.values():
         np.testing.assert_allclose(getattr(read, field), getattr(written, field), rtol=1e-8, atol=1e-12)
+
+
+def logged(degrees_per_s, sampled_every_s, blank=False):
+    """A log at 100 Hz of wheels that turn faster and faster and then rest, whose angles are asked for now and then."""
+    t = np.arange(0.0, 4.0, 0.01)
+    asked = np.floor(t / sampled_every_s + 1e-9) * sampled_every_s
+    angle = np.round(degrees_per_s * np.minimum(asked, 3.0) ** 1.5)
+    new = np.r_[True, np.diff(asked) > 0.0]
+    texts = [f"{a:g}" if n or not blank else "" for a, n in zip(angle, new, strict=True)]
+    rows = [f"{time:.2f},50,50,{a},{a}" for time, a in zip(t, texts, strict=True)]
+    return "\n".join(["t_s,left_duty_pct,right_duty_pct,left_angle_deg,right_angle_deg", *rows, ""])
+
+
+def test_samples_that_a_log_repeats_are_taken_for_blanks(write):
+    repeated = read_recording(write(logged(400.0, 0.12)))
+    blank = read_recording(write(logged(400.0, 0.12, blank=True), name="blank.csv"))
+    moving = repeated.t_s < 3.0
+    np.testing.assert_array_equal(repeated.left_angle_rad[moving], blank.left_angle_rad[moving])
+    assert blank.warnings == ()
+    assert len(repeated.warnings) == 1
+    assert "the wheels' angles are repeated between samples 0.12 s apart" in repeated.warnings[0]
+
+
+@pytest.mark.parametrize("speed", [0.0, 30.0, 400.0, 900.0])
+def test_wheels_that_turn_slowly_or_rest_repeat_no_samples(write, speed):
+    recording = read_recording(write(logged(speed, 0.01)))
+    assert not np.isnan(recording.left_angle_rad).any()
+    assert recording.warnings == ()

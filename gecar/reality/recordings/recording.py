@@ -19,6 +19,7 @@ from gecar.files import write_whole
 from gecar.reality.recordings.columns import COLUMNS, Series
 from gecar.reality.recordings.csv_reader import read_table
 from gecar.reality.recordings.encoder_zero import encoder_zero
+from gecar.reality.recordings.held_samples import without_repeats
 from gecar.reality.recordings.setup import Setup, read_setup, setup_toml
 
 LOGS = (".txt", ".log", ".dat", ".tsv", ".mat", ".xlsx")
@@ -143,8 +144,8 @@ def read_recording(csv_path: Path | str) -> Recording:
     Raises
     ------
     InputError
-        Naming file, line and column, if anything is not as the format has it. Nothing is repaired here: that
-        is for ``gecar import``.
+        Naming file, line and column, if anything is not as the format has it. Nothing is repaired here, which is for
+        ``gecar import``, but that samples repeated until the next become blanks.
     """
     path = Path(csv_path)
     columns, warnings = read_table(path)
@@ -152,6 +153,8 @@ def read_recording(csv_path: Path | str) -> Recording:
         if side in columns:
             columns[side] = _held(path, side, columns[side])
     factors = dict(COLUMNS)
+    columns, repeated = without_repeats(columns)
+    warnings += [f"{path}: {line}" for line in repeated]
     recording = make_recording(str(path), columns, read_setup(path.with_suffix(".toml"), factors), warnings)
     return replace(recording, name=path.stem)
 
