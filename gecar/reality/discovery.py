@@ -207,9 +207,8 @@ def discover(
 
 def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     """Return the verdict, stage by stage."""
-    split, known = context.split, context.robot
-    context.tell(f"fitting on {', '.join(r.name for r in split.fitted)}")
-    noise = estimate_noise(split.fitted, known.physics, MEMORY_S)
+    context.tell(f"fitting on {', '.join(r.name for r in context.split.fitted)}")
+    noise = estimate_noise(context.split.fitted, context.robot.physics, MEMORY_S)
     split, problem, held, seen = _with_logs_repaired(context, noise, threads)
     motion = _explain_motion(context, problem, held, seen)
     explained = motion.explained
@@ -217,21 +216,35 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
     # Where a drive began is told once, or robots would be judged on other readings each.
     held = _with_nuisances(held, explained, explained.taken.physics)
     sensing = _explain_sensor(context, explained, fitted, held)
-    stages = [stage for stage in (motion, sensing) if stage]
+    context.tell("alternatives, location")
+    return _verdict(name, context, split, (motion, sensing) if sensing else (motion,), fitted, held)
+
+
+def _verdict(
+    name: str,
+    context: _Context,
+    split: Split,
+    stages: Sequence[_Stage],
+    fitted: Residuals,
+    held: Residuals,
+) -> Verdict:
+    """Return what the stages found, the motion's first, and judge it on the recordings set aside.
+
+    ``split`` has the repaired recordings; ``fitted`` and ``held`` are their residuals along the path that was found.
+    """
+    known, motion = context.robot, stages[0].explained
     found = known.with_effects({e: v for stage in stages for e, v in stage.explained.taken.values.items()})
     found = found.with_terms([*known.term, *(term for stage in stages for term in stage.laws)])
     before, after = (
-        Contender(robot, _with_nuisances(held, explained, robot.physics)) for robot in (known, found)
+        Contender(robot, _with_nuisances(held, motion, robot.physics)) for robot in (known, found)
     )
-    context.tell("alternatives, location")
     effects, rivals = _findings(context, stages)
-    astray = _astray(motion, after.held)
+    astray = _astray(stages[0], after.held)
     left = _what_is_left(context, stages, fitted, after, [*astray.values()])
     invented = tuple(law for stage in stages for law in stage.invented)
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), left.material)
     unseen = [step.effect for s in stages for step in s.explained.steps if step.effect in s.unseen]
-    candidates = [step for stage in stages for step in stage.candidates]
     nothing = not (effects or invented)
     shows = nothing or len(unseen) < len(effects) or any(law.shows for law in invented)
     where = _located(context, stages, fitted, after.held, found)
@@ -262,20 +275,18 @@ def _discover(name: str, context: _Context, threads: Threads) -> Verdict:
             *notes_on_findings(
                 split,
                 found,
-                candidates,
+                [step for stage in stages for step in stage.candidates],
                 unseen,
                 invented,
-                motion.left_out or motion.acts,
-                _alike(explained),
+                stages[0].left_out or stages[0].acts,
+                _alike(motion),
             ),
-            *notes_on_recordings(
-                split, context.split, fitted, explained.problem.clocks_fitted, where.doubted
-            ),
+            *notes_on_recordings(split, context.split, fitted, motion.problem.clocks_fitted, where.doubted),
             *map(note_on_astray, astray, astray.values()),
         ),
         evidence=Evidence(
-            explained,
-            sensing.explained if sensing else None,
+            motion,
+            stages[1].explained if len(stages) > 1 else None,
             where,
             fitted,
             after.held,
