@@ -67,7 +67,7 @@ from gecar.reality.selection.stepwise import (
     explain,
     left_before,
     left_by,
-    left_share,
+    left_share_of_each,
     likeliest,
     resumed,
 )
@@ -687,7 +687,8 @@ def _is_left(stage: _Stage) -> bool:
     if explained.unexplained or not explained.problem.is_beyond_constants:
         return explained.unexplained
     share = _left(stage) / max(left_before(explained.problem), 1.0)
-    return _left(stage) >= FOR_A_LAW and share > left_share(explained.taken)
+    allowed = left_share_of_each(explained.problem, explained.taken, explained.steps)
+    return _left(stage) >= FOR_A_LAW and share > allowed
 
 
 def _is_material(stage: _Stage, before: _Stage) -> bool:

@@ -18,7 +18,7 @@ from gecar.errors import InputError
 from gecar.reality.discovery import discover
 from gecar.reality.fitting.discrepancy import discrepancy
 from gecar.reality.fitting.initial_values import patches
-from gecar.reality.fitting.model import Model
+from gecar.reality.fitting.model import Model, Step
 from gecar.reality.fitting.parameters import free
 from gecar.reality.materiality import Material, Size
 from gecar.reality.noise.excess_energy import Blocks
@@ -31,7 +31,7 @@ from gecar.reality.residuals.parting import Sizes
 from gecar.reality.residuals.threads import Threads
 from gecar.reality.selection import problem as selection_problem
 from gecar.reality.selection.problem import problem_of, worth_a_name
-from gecar.reality.selection.stepwise import explain, left_share
+from gecar.reality.selection.stepwise import explain, left_share, left_share_of_each
 from gecar.reality.selection.thresholds import LARGE, SMALL
 from gecar.report.verdict import words
 from gecar.world.effects import CATALOGUE
@@ -246,6 +246,18 @@ def test_laws_may_leave_what_they_are_off_by() -> None:
 def test_laws_may_leave_more_of_what_is_small() -> None:
     assert left_share(with_sizes(tyre_friction=-1.5)) > left_share(with_sizes(tyre_friction=-4.0)) + 0.05
     assert left_share(with_sizes(tyre_friction=-0.1)) == left_share(with_sizes(tyre_friction=-1.0))
+
+
+def test_laws_may_leave_no_more_than_a_share_of_what_they_do() -> None:
+    runs = [recorded(EV3.with_effects({"supply_voltage": {"scale": 0.9}}), seed) for seed in range(2)]
+    noise = estimate_noise(runs, EV3.physics, 1.0)
+    residuals = motion_residuals(runs, noise, 1.0, Threads(1))
+    effects = ("supply_voltage", "tyre_friction")
+    problem = problem_of(residuals, EV3, effects)
+    model = problem.estimator.fit(effects, {})
+    steps = tuple(Step(effect, problem.known, model, 1.0) for effect in effects)
+    assert left_share_of_each(problem, model, steps) < left_share(model) - 0.05
+    assert left_share_of_each(problem, model, ()) == left_share(problem.known)
 
 
 def test_small_changes_each_have_their_own_size() -> None:

@@ -404,7 +404,7 @@ def test_laws_are_tried_where_what_is_left_is_not_material_but_stands_out(monkey
     assert law.term.law == "c1 * sin(k1 * angle)"
     assert law.parameters["c1"].value == pytest.approx(0.02, rel=0.1)
     with monkeypatch.context() as patched:  # as if effects' own laws were off by as much
-        patched.setattr(discovery, "left_share", lambda _: 1.0)
+        patched.setattr(discovery, "left_share_of_each", lambda *_: 1.0)
         assert with_oval_wheels(0.02).invented == ()
     with monkeypatch.context() as patched:  # as if they left most of what there was
         patched.setattr(discovery, "INSTEAD", 0.0)

@@ -24,6 +24,7 @@ from gecar.reality.selection.acceptance import (
     lead,
     most_uneven,
     proved,
+    size_of,
     stands_out,
     stopped,
 )
@@ -291,6 +292,16 @@ def is_much(problem: Problem, now: float, before: float, allowed: float) -> bool
 def left_share(model: Model) -> float:
     """Return the share of the initial error that a model's effects may leave, because their laws are approximate."""
     return LEFT_SHARE + max((_off(model, effect) for effect in model.effects), default=0.0)
+
+
+def left_share_of_each(problem: Problem, model: Model, steps: Sequence[Step]) -> float:
+    """Return the same with every effect's approximation counted by what that effect does to the robot alone.
+
+    One that does little can leave little: more grip, whose law is rough, excuses nothing of what a delay does.
+    """
+    before = max(left_before(problem), 1.0)
+    does = ((step, problem.material.times(size_of(problem, model, step)) / before) for step in steps)
+    return LEFT_SHARE + max((min(share, 1.0) * _off(model, step.effect) for step, share in does), default=0.0)
 
 
 def _off(model: Model, effect: str) -> float:
