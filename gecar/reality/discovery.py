@@ -103,6 +103,9 @@ INSTEAD = 0.7
 # Times the misfit of readings along the camera's own path that a law's path must leave for the law to be refused: laws
 # for a table that shakes leave far more, and right ones less.
 READS_WORSE = 1.2
+# Times its misfit under the known robot that an instrument may have under what was found without it: an instrument's
+# own errors make up for less than half of what an effect does.
+UNDONE = 4.0
 REPAIRS = 3  # of logs, at most: by the known robot first, then by the one found
 # Times the material size, and what recordings fitted on leave, that one set aside must leave to be told of by itself.
 ASTRAY = 3.0
@@ -554,7 +557,7 @@ def _explained_without(
         return None
     context.tell(f"much is unexplained: once more without the {instrument}")
     motion = _explained_in_part(context, alone, beside, fitted)
-    if motion is None:
+    if motion is None or _is_undone(instrument, context.robot, motion.explained, fitted):
         return None
     both = resumed(_problem(context, context.robot, fitted, held), motion.explained)
     seen = _with_intervals(context, confirmed(both, held), held)
@@ -564,6 +567,17 @@ def _explained_without(
     if named - again and _is_worse_without(instrument, before.explained, motion.explained):
         return None
     return replace(motion, left_out=WITHOUT[instrument])
+
+
+def _is_undone(instrument: str, known: Robot, without: Explanation, fitted: Residuals) -> bool:
+    """Whether an instrument saw the known robot, and not what was found without it.
+
+    An instrument that errs does not err by just what an effect does to the robot.
+    """
+    (other,) = INSTRUMENTS.keys() - {instrument}
+    seen = fitted.without(other)
+    before, after = (cost(seen.errors(physics)) for physics in (known.physics, without.taken.physics))
+    return after > UNDONE * before + PRICE
 
 
 def _is_worse_without(instrument: str, before: Explanation, without: Explanation) -> bool:

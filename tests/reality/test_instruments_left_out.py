@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.concealing import EV3, recorded
+from support.concealing import EV3, motion_of, recorded
 
 from gecar.reality import discovery
 from gecar.reality.discovery import discover
@@ -89,3 +89,13 @@ def test_paths_speak_for_the_encoders_and_encoders_for_the_poses(
         for mm, costs in ((9.0, 100.0), (off_mm, cost))
     )
     assert discovery._is_worse_without(instrument, before, without) is worse  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("damaged", "undone"), [(recorded, True), (jumping, False)])
+def test_encoders_that_saw_the_known_robot_are_not_left_out(
+    damaged: Callable[[Robot, int], Recording], undone: bool
+) -> None:
+    rough = EV3.with_effects({"viscous_friction": {"coefficient_nms": 0.002}})
+    runs = [damaged(rough if damaged is jumping else EV3, seed) for seed in range(2)]
+    without = SimpleNamespace(taken=SimpleNamespace(physics=rough.physics))
+    assert discovery._is_undone("encoders", EV3, without, motion_of(runs)) is undone  # type: ignore[arg-type]
