@@ -17,6 +17,7 @@ from gecar.language.grammar import Grammar
 from gecar.language.program import Program
 from gecar.reality.advise.next_recording import suggest
 from gecar.reality.advise.notes import (
+    ALONG_ENCODERS,
     WITHOUT,
     note_on_astray,
     note_on_kind,
@@ -414,7 +415,10 @@ def _explain_motion(context: _Context, problem: Problem, held: Residuals, seen: 
         return found
     without = (_explained_without(context, each, found, problem.residuals, held) for each in INSTRUMENTS)
     in_part = next(filter(None, without), None)
-    return in_part or _explained_at_other_times(context, found, moments, problem.residuals, held)
+    found = in_part or _explained_at_other_times(context, found, moments, problem.residuals, held)
+    if found.left_out or not found.explained.unexplained:
+        return found
+    return _explained_along_encoders(context, found, problem.residuals, held) or found
 
 
 def _written(context: _Context, effects: _Stage) -> _Stage:
@@ -563,10 +567,30 @@ def _explained_without(
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
-    named, again = ({step.effect for step in stage.explained.steps} for stage in (before, motion))
-    if named - again and _is_worse_without(instrument, before.explained, motion.explained):
+    if _named(before) - _named(motion) and _is_worse_without(instrument, before.explained, motion.explained):
         return None
     return replace(motion, left_out=WITHOUT[instrument])
+
+
+def _explained_along_encoders(
+    context: _Context, before: _Stage, fitted: Residuals, held: Residuals
+) -> _Stage | None:
+    """Explain where the robot went by how its wheels turned, whatever turned them; None if that fails.
+
+    Names given ``before`` are not lost.
+    """
+    alone, beside = (residuals.along_encoders() for residuals in (fitted, held))
+    if not alone.recordings:
+        return None
+    context.tell("much is unexplained: once more with wheels that turn as the encoders say")
+    motion = _explained_in_part(context, alone, beside, fitted)
+    if motion is None or not _named(before) <= _named(motion):
+        return None
+    return replace(motion, left_out=ALONG_ENCODERS)
+
+
+def _named(stage: _Stage) -> set[str]:
+    return {step.effect for step in stage.explained.steps}
 
 
 def _is_undone(instrument: str, known: Robot, without: Explanation, fitted: Residuals) -> bool:

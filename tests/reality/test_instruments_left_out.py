@@ -11,10 +11,12 @@ import pytest
 from support.concealing import EV3, motion_of, recorded
 
 from gecar.reality import discovery
+from gecar.reality.advise.notes import ALONG_ENCODERS
 from gecar.reality.discovery import discover
 from gecar.reality.materiality import DEFAULT, Size
 from gecar.reality.recordings.recording import Case, Recording
 from gecar.world.robot import Robot
+from gecar.world.terms import Term
 
 
 def jumping(robot: Robot, seed: int) -> Recording:
@@ -99,3 +101,17 @@ def test_encoders_that_saw_the_known_robot_are_not_left_out(
     runs = [damaged(rough if damaged is jumping else EV3, seed) for seed in range(2)]
     without = SimpleNamespace(taken=SimpleNamespace(physics=rough.physics))
     assert discovery._is_undone("encoders", EV3, without, motion_of(runs)) is undone  # type: ignore[arg-type]
+
+
+def test_where_the_robot_went_is_explained_by_its_wheels_whatever_turned_them() -> None:
+    """Motors pushed about in a way of each drive's own, above wheels that are too close."""
+    narrow, runs = EV3.with_effects({"track_width": {"scale": 0.95}}), []
+    for seed in range(4):
+        pushed = Term(port="motor_torque", law="c1 * sin(c2 * time) * side", c1=0.06, c2=5.0 + 1.7 * seed)
+        runs.append(recorded(narrow.with_terms([pushed]), seed))
+    verdict = discover(Case("made", tuple(runs)))
+    assert verdict.verdict == "missing_and_unexplained"
+    (found,) = verdict.effects
+    assert found.id == "track_width"
+    assert found.parameters["scale"].value == pytest.approx(0.95, abs=0.005)
+    assert ALONG_ENCODERS in verdict.notes

@@ -166,6 +166,21 @@ def test_twelve_seconds_replay_within_a_few_milliseconds() -> None:
     assert (time.process_time() - began) / 10 < 0.006  # 0.0007 on an idle core; this machine may be busy
 
 
+def test_along_its_encoders_a_robot_goes_where_its_wheels_took_it_whatever_turned_them() -> None:
+    weaker = EV3.with_effects(
+        {"supply_voltage": {"scale": 0.7}, "viscous_friction": {"coefficient_nms": 0.002}}
+    )
+    replayer = replayer_of(driven(waves, steps, robot=weaker))
+    by_commands, along = (each.play(EV3.physics).poses[-1] for each in (replayer, replayer.along_encoders()))
+    ended = replayer.inputs.pose[-1]
+    assert abs(by_commands - ended)[2] > 0.5
+    assert np.hypot(*(along - ended)[:2]) < 0.003
+    assert abs(along - ended)[2] < 0.02
+    narrow = EV3.with_effects({"track_width": {"scale": 0.9}}).physics
+    turned = replayer.along_encoders().play(narrow).poses[:, 2]
+    assert turned[-1] - turned[0] == pytest.approx((ended[2] - 0.3) / 0.9, rel=0.01)
+
+
 def every_robot() -> np.ndarray:
     """Physics of the EV3, regulated, and with each effect of the catalogue; again with more mass; shape (n,)."""
     drive = EV3.drive.model_copy(update={"mode": "speed"})
@@ -177,9 +192,10 @@ def every_robot() -> np.ndarray:
     return np.concatenate([physics, heavier])
 
 
+@pytest.mark.parametrize("rolls", [False, True])
 @pytest.mark.parametrize("memory_s", [1.0, np.inf])
 @pytest.mark.parametrize("rig", ["floor", "bench"])
-def test_robots_in_lock_step_are_replayed_as_each_alone(memory_s: float, rig: str) -> None:
+def test_robots_in_lock_step_are_replayed_as_each_alone(memory_s: float, rig: str, rolls: bool) -> None:
     physics = every_robot()
     whole, row = driven(waves, steps, seconds=2.0, rig=rig), np.arange(200)
     gaps = replace(
@@ -189,7 +205,7 @@ def test_robots_in_lock_step_are_replayed_as_each_alone(memory_s: float, rig: st
         left_angle_rad=np.where(row % 2 == 0, np.nan, whole.left_angle_rad),
     )
     for recording in (driven(steps, waves, seconds=2.0, rig=rig), gaps):
-        replayer = replayer_of(recording, memory_s=memory_s)
+        replayer = replayer_of(recording, memory_s=memory_s).along_encoders(rolls)
         together = replayer.errors(physics)
         for k in range(len(physics)):
             alone = replayer.play(physics[k : k + 1])

@@ -31,6 +31,10 @@ WITHOUT = {
     "what was found explains how the wheels turned. Check whether the camera was moved, and its frame.",
 }
 """What a verdict says of an instrument that was left out, by its name."""
+ALONG_ENCODERS = (
+    "No effect of the catalogue explains how the commands turned the wheels. That was left out: what was found explains"
+    " where the robot went while its wheels turned as the encoders say. Look at motors, gears, battery and commands."
+)
 MOST_MOMENTS = 4  # that are given
 
 

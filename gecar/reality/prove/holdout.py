@@ -130,6 +130,7 @@ def replayed(run: RecordingResiduals, physics: Physics, start_s: float = np.inf)
     """
     replayer = replayer_of(run.recording, run.noise.sd).with_clock(run.nuisances.clock_offset_s)
     replayer = replayer.with_mark(run.nuisances.mark)
+    replayer = replayer.along_encoders() if run.replayer.inputs.rolls else replayer
     t = replayer.inputs.pose_t
     within = start_s if len(t) and t[0] <= start_s else np.inf
     return Replayed(replayer, replayer.play(physics, replayer.aligned_start(physics, within)))

@@ -28,6 +28,7 @@ from gecar.reality.replay.pose_filter import (
     begin_filter,
     correct,
     grow,
+    move,
     predict_pose,
     rebase,
 )
@@ -120,6 +121,22 @@ def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
 
 
 @kernel
+def _roll_along(angle_sd: float, flat: Array, lanes: int) -> None:
+    """Roll every lane's robot by what the encoders counted beyond its own wheels; ``angle_sd`` is their noise [rad]."""
+    for lane in range(lanes):
+        s = load_state(flat, lanes, lane)
+        p = load_physics(flat, lanes, lane)
+        c = load_derived(flat, lanes, lane)
+        r = _load_row(flat, lanes, lane)
+        left = 0.0 if math.isnan(r.left_error) else r.left_error * angle_sd * c.left_radius
+        right = 0.0 if math.isnan(r.right_error) else r.right_error * angle_sd * c.right_radius
+        ahead, turn = 0.5 * (left + right), 0.5 * (right - left) / c.half_track
+        middle = s.heading + 0.5 * turn
+        move(s, p, ahead * math.cos(middle), ahead * math.sin(middle), turn)
+        store_state(flat, lanes, lane, s)
+
+
+@kernel
 def _compare_row(
     i: int, back: float, inputs: KernelInput, weights: Array, flat: Array, lanes: int, terms: bool
 ) -> None:
@@ -141,11 +158,13 @@ def _compare_row(
         r.left_error = (left - r.left_angle) / angle_sd
         r.right_error = (right - r.right_angle) / angle_sd
         r.battery_error = (battery - r.battery) / battery_sd
-        if not endless:
+        if not endless or inputs.rolls:
             s.left_angle += 0.0 if math.isnan(r.left_error) else r.left_error * angle_sd / left_weight
             s.right_angle += 0.0 if math.isnan(r.right_error) else r.right_error * angle_sd / right_weight
         store_state(flat, lanes, lane, s)
         _store_row(flat, lanes, lane, r)
+    if inputs.rolls:
+        _roll_along(angle_sd, flat, lanes)
 
 
 @kernel
@@ -216,7 +235,7 @@ def _weigh(i: int, inputs: KernelInput, weights: Array) -> None:
         weights[0] = weights[1] = 0.0
     for k in range(2):
         if not math.isnan(inputs.measured[i, k]):
-            keep = math.exp(-(inputs.t[i] - weights[2 + k]) / inputs.memory)
+            keep = 0.0 if inputs.rolls else math.exp(-(inputs.t[i] - weights[2 + k]) / inputs.memory)
             weights[k] = 1.0 + weights[k] * keep
             weights[2 + k] = inputs.t[i]
 

@@ -34,6 +34,8 @@ class KernelInput(NamedTuple):
         At which rows and poses all that was measured before is forgotten, shapes (rows,) and (poses,).
     bench
         Whether the wheels are in the air.
+    rolls
+        Whether the wheels turn as the encoders say, whatever commands make of motors.
     """
 
     t: Array
@@ -48,6 +50,7 @@ class KernelInput(NamedTuple):
     anew: Mask
     pose_anew: Mask
     bench: bool
+    rolls: bool = False
 
 
 class Kept(NamedTuple):

@@ -102,12 +102,18 @@ def _take_in(
 
 @kernel
 def rebase(s: Any, p: Any, f: Any) -> None:
-    """Move the robot by what was corrected; its velocity turns with it."""
-    x = s.x - p.com_ahead * s.cos + f.shift_x
-    y = s.y - p.com_ahead * s.sin + f.shift_y
+    """Move the robot by what was corrected."""
+    move(s, p, f.shift_x, f.shift_y, f.shift_heading)
+
+
+@kernel
+def move(s: Any, p: Any, shift_x: float, shift_y: float, turn: float) -> None:
+    """Move the robot's axle by so much [m], and turn the robot about it [rad]; its velocity turns with it."""
+    x = s.x - p.com_ahead * s.cos + shift_x
+    y = s.y - p.com_ahead * s.sin + shift_y
     ahead = s.vx * s.cos + s.vy * s.sin
     aside = s.vy * s.cos - s.vx * s.sin
-    s.heading += f.shift_heading
+    s.heading += turn
     s.cos = math.cos(s.heading)
     s.sin = math.sin(s.heading)
     s.x = x + p.com_ahead * s.cos

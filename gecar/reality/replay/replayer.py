@@ -156,6 +156,13 @@ class Replayer:
         """Return this to be replayed whole, never re-based on what was measured."""
         return replace(self, inputs=self.inputs._replace(memory=np.inf))
 
+    def along_encoders(self, rolls: bool = True) -> Replayer:
+        """Return this with wheels that turn as the encoders say; or as commands make them turn again.
+
+        Slip and the body's swing are simulated in any case.
+        """
+        return replace(self, inputs=self.inputs._replace(rolls=rolls))
+
     def with_memory(self, memory_s: float) -> Replayer:
         """Return this with another memory [s]: over how long it is drawn back to the measurement.
 

@@ -34,6 +34,7 @@ GYRO_SCALE, GYRO_BIAS_RAD_S, GYRO_LATE_S = 0.02, 0.01, 0.01  # a LEGO gyro: with
 ENCODER_WAVE_RAD = math.radians(1.0)  # as much as such an encoder's resolution
 # Each tells motion by itself; with their fields of a recording.
 INSTRUMENTS = {"encoders": ("left_angle_rad", "right_angle_rad"), "poses": POSE_FIELDS}
+ENCODED = frozenset(INSTRUMENTS["encoders"])
 LARGEST = 1e3  # standard deviations at which residuals are cut
 
 
@@ -177,13 +178,25 @@ class Residuals:
         seen = [run for run in self.recordings if run.tells_places]
         return replace(self, recordings=tuple(run.away_from(place, radius_m) for run in seen))
 
+    def along_encoders(self) -> Residuals:
+        """Return these with wheels that turn as the encoders say; recordings without encoders or poses are left out."""
+        seen = [
+            run for run in self.recordings if run.tells_places and ENCODED.issubset(run.recording.measured)
+        ]
+        return replace(self, recordings=tuple(run.along_encoders() for run in seen))
+
+    @property
+    def follow_encoders(self) -> bool:
+        """Whether the wheels turn as the encoders say, whatever the motors do."""
+        return bool(self.recordings) and self.recordings[0].replayer.inputs.rolls
+
     def except_at(self, rows: Sequence[Mask]) -> Residuals:
         """Return these with motion not compared at some rows, of each recording (rows,), nor just after."""
         there = zip(self.recordings, rows, strict=True)
         return replace(self, recordings=tuple(run.except_at(mask) for run, mask in there))
 
     def everywhere(self) -> Residuals:
-        """Return these with motion compared everywhere again."""
+        """Return these with motion compared everywhere again, by the commands."""
         return replace(self, recordings=tuple(run.throughout() for run in self.recordings))
 
     def with_memory(self, memory_s: float) -> Residuals:

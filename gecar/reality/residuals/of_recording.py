@@ -112,10 +112,14 @@ class RecordingResiduals:
         last = np.maximum.accumulate(np.where(rows, t, -np.inf))
         return replace(self, in_part=True, replayer=self.replayer.anew_at(t - last <= RECOVERS_S))
 
+    def along_encoders(self) -> RecordingResiduals:
+        """Return this with wheels that turn as the encoders say, so that the poses alone are compared."""
+        return replace(self, replayer=self.replayer.along_encoders())
+
     def throughout(self) -> RecordingResiduals:
-        """Return this with its motion compared at all rows again."""
+        """Return this with its motion compared at all rows again, and wheels that turn by their commands."""
         nowhere = np.zeros(len(self.replayer.t), bool)
-        return replace(self, in_part=False, replayer=self.replayer.anew_at(nowhere))
+        return replace(self, in_part=False, replayer=self.replayer.anew_at(nowhere).along_encoders(False))
 
     def localised(self, physics: Physics) -> RecordingResiduals:
         """Return this with the start pose its readings tell, where no camera looked; or else the bare floor it read."""
@@ -222,6 +226,7 @@ class RecordingResiduals:
         times = np.concatenate([np.tile(t, 4), np.tile(inputs.pose_t, 3)])
         there = ~np.isnan(np.concatenate([self.replayer.measured.T.ravel(), inputs.pose.T.ravel()]))
         there &= ~np.r_[np.tile(self.replayer.anew, 4), np.tile(inputs.pose_anew, 3)]
+        there[: 4 * len(t) * inputs.rolls] = False
         return _index(number, channel, times), there
 
     def sensor_index(self, number: int) -> tuple[ResidualIndex, Mask]:

@@ -20,8 +20,15 @@ def observable(catalogue: Sequence[Effect], residuals: Residuals) -> tuple[str, 
     return tuple(
         effect.id
         for effect in catalogue
-        if effect.of_sensor == residuals.sensor and there.issuperset(effect.needs)
+        if effect.of_sensor == residuals.sensor
+        and there.issuperset(effect.needs)
+        and not (residuals.follow_encoders and _turns_wheels(effect))
     )
+
+
+def _turns_wheels(effect: Effect) -> bool:
+    """Whether an effect changes how the wheels turn, which says nothing where they turn as the encoders say."""
+    return "motor" in effect.channels or "pose" not in effect.channels
 
 
 def _available(residuals: Residuals) -> set[str]:
