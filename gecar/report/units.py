@@ -107,8 +107,10 @@ _READINGS: Mapping[str, Reading] = {
     "line_dx": Reading("shifted along x", "mm", _MM),
     "line_dy": Reading("shifted along y", "mm", _MM),
     "line_angle": Reading("turned", "deg", _times(1.0 / DEG)),
+    "line_scale": Reading("printed at", "%", _PCT),
     "clock_skew": Reading("clock fast by", "%", _PCT),
     "pose_delay": Reading("delay", "ms", _MS),
+    "pose_scale": Reading("lengths appear at", "%", _PCT),
 }
 _SHAPES = ("ripple_phase", "ripple_lead")  # say nothing to anybody
 

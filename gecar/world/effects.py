@@ -368,12 +368,24 @@ CATALOGUE: tuple[Effect, ...] = (
             _P("line_angle", "angle_rad", "rad", -0.1, 0.1, 0.0, 0.005)),
            ("sensor",), "a place on the map", "rigid displacement of the printed course about the field's origin",
            needs=("pose",), starts=_SHIFTS),
+    Effect("line_scale", "the course is printed larger or smaller",
+           # printers that fit a page to the paper take 2 to 7 %
+           (_P("line_scale", "scale", "-", 0.85, 1.15, 1.0, 0.004),),
+           ("sensor",), "a place on the map, more so at its ends",
+           "stretch of the printed course about the field's middle",
+           needs=("pose",), starts=_values("scale", 0.93, 0.97, 0.985, 1.015, 1.03, 1.07)),
     Effect("clock_skew", "the log's clock runs fast or slow",
            (_P("clock_skew", "rate", "-", -0.06, 0.06, 0.0, 0.004),),
            ("clock",), "grows with time", "log time = true time x (1 + rate)"),
     Effect("pose_delay", "camera poses are late",
            (_P("pose_delay", "time_s", "s", 0.0, 0.3, 0.0, 0.005),),
            ("pose", "clock"), "all motion, in the pose only", "pure delay between motion and logged pose",
+           needs=("floor", "pose")),
+    Effect("pose_scale", "the camera sees lengths larger or smaller",
+           # a mark 60 mm above the plane that a camera 2 m up was calibrated for: 3 %
+           (_P("pose_scale", "scale", "-", 0.8, 1.25, 1.0, 0.006),),
+           ("pose",), "pose against encoders, straight and not in turns",
+           "pinhole camera that looks straight down: magnified about the field's middle",
            needs=("floor", "pose")),
 )  # fmt: skip
 

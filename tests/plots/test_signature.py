@@ -23,7 +23,12 @@ def test_the_size_that_is_shown_can_be_seen(effect):
 
 @pytest.mark.parametrize(
     ("effect", "place"),
-    [("backlash", []), ("slippery_patch", ["slippery"]), ("line_shift", ["the line's place"])],
+    [
+        ("backlash", []),
+        ("slippery_patch", ["slippery"]),
+        ("line_shift", ["the line's place"]),
+        ("line_scale", ["the line's place"]),
+    ],
 )
 def test_a_signature_is_whole_and_names_both_ways_and_the_place(effect, place):
     figure = signature_figure(effect, EV3, COURSE)

@@ -72,3 +72,15 @@ def test_an_effect_is_found_beside_a_mark_and_only_the_mark_without_one(scale: f
     if scale:
         found = verdict.effects[0].parameters["scale"]
         assert found.low < scale < found.high
+
+
+def test_a_camera_that_sees_lengths_smaller_is_told_as_such() -> None:
+    """Wheels and a track that are both smaller by as much would look alike."""
+    runs = []
+    for seed in range(4):
+        run = recorded(EV3, seed)
+        runs.append(replace(run, x_m=1.2 + 0.97 * (run.x_m - 1.2), y_m=0.6 + 0.97 * (run.y_m - 0.6)))
+    verdict = discover(Case("made", tuple(runs)))
+    (found,) = verdict.effects
+    assert (verdict.verdict, found.id) == ("missing", "pose_scale")
+    assert found.parameters["scale"].low < 0.97 < found.parameters["scale"].high

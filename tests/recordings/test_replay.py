@@ -94,6 +94,17 @@ def test_late_camera_poses_are_of_earlier() -> None:
     np.testing.assert_allclose(poses[5:], seen[:-5], atol=1e-9)
 
 
+def test_a_camera_sees_lengths_smaller_about_the_point_below_it() -> None:
+    recording = driven(steps, waves)
+    smaller = EV3.with_effects({"pose_scale": {"scale": 0.97}}).physics
+    began = np.array([1.2 + 0.97 * (1.0 - 1.2), 0.6 + 0.97 * (0.5 - 0.6), 0.3])
+    played = replayer_of(recording).with_camera_over((1.2, 0.6)).play(smaller, began)
+    np.testing.assert_allclose(played.poses[:, 0], 1.2 + 0.97 * (recording.x_m - 1.2), atol=1e-9)
+    np.testing.assert_allclose(played.poses[:, 1], 0.6 + 0.97 * (recording.y_m - 0.6), atol=1e-9)
+    np.testing.assert_allclose(played.poses[:, 2], recording.heading_rad, atol=1e-9)
+    np.testing.assert_allclose(played.rows[:, 4], recording.x_m, atol=1e-9)
+
+
 def test_uneven_rows_see_the_same_motion() -> None:
     recording = driven(steps, waves)
     rows = np.sort(np.random.default_rng(1).choice(np.arange(1, 400), 150, replace=False))

@@ -110,7 +110,7 @@ def test_effect_reaches_the_kernel_in_si():
 
 def test_every_parameter_is_a_field_once():
     assert len(set(PHYSICS.names)) == len(PHYSICS.names)
-    assert len(BY_ID) == len(CATALOGUE) == 42
+    assert len(BY_ID) == len(CATALOGUE) == 44
     for effect in CATALOGUE:
         for parameter in effect.parameters:
             assert parameter.low <= EV3.nominal(parameter) <= parameter.high

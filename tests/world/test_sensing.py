@@ -117,6 +117,24 @@ def test_shifted_course_is_seen_where_it_lies(look, shift):
 
 
 @pytest.mark.parametrize("look", [seen, spot_seen])
+@pytest.mark.parametrize("size", [0.97, 1.05])
+def test_a_course_of_another_size_is_seen_where_it_is_printed(look, size):
+    printed = EV3.with_effects({"line_scale": {"scale": size}})
+    course = load_course("paper")
+    middle, ahead = complex(course.width_m, course.height_m) / 2.0, EV3.colour_sensor.ahead
+    poses = [(0.0815, 0.6, 0.0), (0.083, 0.7, 0.2), (1.2, 0.08, 1.55)]
+    seen_at = [complex(x, y) + ahead * np.exp(1j * heading) for x, y, heading in poses]
+    axles = [
+        middle + size * (spot - middle) - ahead * np.exp(1j * heading)
+        for spot, (_, _, heading) in zip(seen_at, poses, strict=True)
+    ]
+    there = [(axle.real, axle.imag, heading) for axle, (_, _, heading) in zip(axles, poses, strict=True)]
+    # the sensor's spot stays as large as it is
+    assert [look(*pose, printed) for pose in there] == pytest.approx([look(*pose) for pose in poses], abs=3.0)
+    assert np.abs(np.subtract([look(*pose) for pose in there], [look(*pose) for pose in poses])).max() > 10.0
+
+
+@pytest.mark.parametrize("look", [seen, spot_seen])
 def test_a_sensor_mounted_elsewhere_sees_what_is_there(look):
     moved = EV3.with_effects(
         {"sensor_position": {"ahead_m": EV3.colour_sensor.ahead + 0.01, "left_m": -0.02}}

@@ -161,8 +161,11 @@ def _marks(verdict: Verdict) -> list[dict[str, Any]]:
             where = {"x": values["x_m"], "y": values["y_m"], "r": values["radius_m"]}
             out.append({"kind": "patch", "words": "slippery here"} | where)
         if found.id == "line_shift":
-            moved = {"dx": values["dx_m"], "dy": values["dy_m"], "angle": values["angle_rad"]}
+            moved = {"dx": values["dx_m"], "dy": values["dy_m"], "angle": values["angle_rad"], "scale": 1.0}
             out.append({"kind": "line", "words": "where the line lies"} | moved)
+        if found.id == "line_scale":
+            printed = {"dx": 0.0, "dy": 0.0, "angle": 0.0, "scale": values["scale"]}
+            out.append({"kind": "line", "words": "the line as it is printed"} | printed)
         if found.id == "floor_tilt":
             out.append({"kind": "tilt", "words": "downhill", "x": values["x_rad"], "y": values["y_rad"]})
     places = [place.place for place in verdict.located if place.place is not None]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from shapely.affinity import rotate, translate
+from shapely.affinity import rotate, scale, translate
 
 from gecar.plots.courses.course import draw_course, outline_patch
 from gecar.plots.style import BLUE, INK, ORANGE, SKY, VERMILION, headline, look, new_figure
@@ -60,6 +60,7 @@ SHOWN: Mapping[str, Mapping[str, float]] = {
     "command_slew": {"rate_pct_s": 150.0},
     "spot_size": {"diameter_m": 0.04},
     "line_shift": {"dy_m": 0.03},
+    "line_scale": {"scale": 0.95},
 }  # fmt: skip
 
 
@@ -163,8 +164,11 @@ def _draw_place(axes: Axes, course: Course, robot: Robot) -> None:
         patch = Circle(centre, float(own["patch_radius"]), color=VERMILION, alpha=0.2, linewidth=0)
         axes.add_patch(patch)
         patch.set_label("slippery")
-    if own["line_dx"] or own["line_dy"] or own["line_angle"]:
-        turned = rotate(course.line_area, float(own["line_angle"]), origin=(0, 0), use_radians=True)
+    stretch = float(own["line_scale"])
+    if own["line_dx"] or own["line_dy"] or own["line_angle"] or stretch != 1.0:
+        middle = 0.5 * course.width_m, 0.5 * course.height_m
+        printed = scale(course.line_area, stretch, stretch, origin=middle)
+        turned = rotate(printed, float(own["line_angle"]), origin=(0, 0), use_radians=True)
         moved = translate(turned, float(own["line_dx"]), float(own["line_dy"]))
         line = outline_patch(moved, facecolor="none", edgecolor=VERMILION, linestyle="--", zorder=3.0)
         axes.add_patch(line)

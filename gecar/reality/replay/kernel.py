@@ -251,13 +251,15 @@ def _compare_pose(
     turn = inputs.walk[1] * inputs.walk[1] * elapsed
     if inputs.pose_anew[j]:
         place = turn = UNKNOWN
-    endless = math.isinf(inputs.memory)
+    endless, over_x, over_y = math.isinf(inputs.memory), inputs.camera[0], inputs.camera[1]
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         p = load_physics(flat, lanes, lane)
         f = _load_filter(flat, lanes, lane)
         r = _load_pose(flat, lanes, lane)
         predict_pose(s, p, back, r)
+        r.x += (p.pose_scale - 1.0) * (r.x - over_x)
+        r.y += (p.pose_scale - 1.0) * (r.y - over_y)
         if terms:
             r.x += r.x_off
             r.y += r.y_off
@@ -276,8 +278,8 @@ def _compare_pose(
 
 
 @kernel
-def _begin(physics: npt.NDArray[Any], start: Array, dt: float, flat: Array, lanes: int) -> None:
-    """Put every lane's robot at rest at the start."""
+def _begin(physics: npt.NDArray[Any], start: Array, over: Array, dt: float, flat: Array, lanes: int) -> None:
+    """Put every lane's robot at rest where the camera, above ``over``, sees the start."""
     for lane in range(lanes):
         p = physics[lane]
         store_physics(flat, lanes, lane, p)
@@ -285,7 +287,9 @@ def _begin(physics: npt.NDArray[Any], start: Array, dt: float, flat: Array, lane
         derive(p, dt, c)
         store_derived(flat, lanes, lane, c)
         s = load_state(flat, lanes, lane)
-        place(s, p, start[0], start[1], start[2])
+        farther = 1.0 / p.pose_scale - 1.0
+        x, y = start[0] + farther * (start[0] - over[0]), start[1] + farther * (start[1] - over[1])
+        place(s, p, x, y, start[2])
         store_state(flat, lanes, lane, s)
         f = _load_filter(flat, lanes, lane)
         begin_filter(f, start[0], start[1])
@@ -413,7 +417,7 @@ def _replay_kernel(lanes: int, terms: bool) -> Any:  # noqa: C901
         inputs: KernelInput, physics: npt.NDArray[Any], start: Array, offset: float, dt: float,
         flat: Array, weights: Array, stores: Array, kept: Kept, alike: bool, light: bool,
     ) -> None:  # fmt: skip
-        _begin(physics, start, dt, flat, lanes)
+        _begin(physics, start, inputs.camera, dt, flat, lanes)
         shared = physics[0]
         cap, delay = shared.duty_cap, shared.actuation_delay
         stretch = 1.0 / (1.0 + shared.clock_skew)
@@ -480,7 +484,7 @@ def replay_rows(
     physics
         Records of dtype `PHYSICS`, shape (1,) or (LANES,); they share `TIMING`.
     start
-        Start pose of the axle's centre [m, m, rad], shape (3,).
+        Start pose of the axle's centre, as the camera sees it [m, m, rad], shape (3,).
     offset
         How late this recording's camera clock is, besides the robots' ``pose_delay`` [s].
     dt

@@ -34,6 +34,8 @@ class KernelInput(NamedTuple):
         At which rows and poses all that was measured before is forgotten, shapes (rows,) and (poses,).
     bench
         Whether the wheels are in the air.
+    camera
+        The point on the floor below the camera, about which it may see lengths larger or smaller: x, y [m], shape (2,).
     rolls
         Whether the wheels turn as the encoders say, whatever commands make of motors.
     """
@@ -50,6 +52,7 @@ class KernelInput(NamedTuple):
     anew: Mask
     pose_anew: Mask
     bench: bool
+    camera: Array
     rolls: bool = False
 
 

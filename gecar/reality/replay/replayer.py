@@ -145,6 +145,10 @@ class Replayer:
         pose = axle_pose(self.poses_seen, mark)
         return replace(self, inputs=self.inputs._replace(pose=pose), start=_first_pose(pose))
 
+    def with_camera_over(self, place: tuple[float, float]) -> Replayer:
+        """Return this with the camera above a point on the floor [m]."""
+        return replace(self, inputs=self.inputs._replace(camera=np.array(place)))
+
     def later(self, seconds: float) -> Replayer:
         """Return this with all times later by so much [s]: part of a step moves where steps fall among the rows."""
         t, command_t, pose_t = (
@@ -266,7 +270,7 @@ def replayer_of(
     command_t, commands = command_t[order], np.vstack([commands, recording.lost_commands])[order]
     inputs = KernelInput(
         t, command_t, commands, measured, pose_t, pose, np.array(sd, float), np.array(walk, float), memory_s,
-        np.zeros(len(t), bool), np.zeros(len(pose_t), bool), r.setup.rig == "bench",
+        np.zeros(len(t), bool), np.zeros(len(pose_t), bool), r.setup.rig == "bench", np.zeros(2),
     )  # fmt: skip
     return Replayer(recording, inputs, pose, _first_pose(pose))
 

@@ -283,6 +283,8 @@ def residuals_of(
     seen = ~np.isnan(recording.reflection_pct)
     read = course is not None and seen.any() and recording.setup.rig == "floor"
     replayer = replayer_of(recording, noise.sd, noise.walk, memory_s)
+    if course is not None:
+        replayer = replayer.with_camera_over((0.5 * course.width_m, 0.5 * course.height_m))
     return RecordingResiduals(recording, noise, replayer, course if read else None)
 
 

@@ -125,20 +125,24 @@ def glance(
         How far this sensor sits to the front and to the left of its nominal place [m].
     """
     ahead = p.sensor_ahead + front - p.com_ahead
-    x, y = _where_drawn(s.x, s.y, s.cos, s.sin, ahead, p.sensor_left + left, p)
+    x, y = _where_drawn(s.x, s.y, s.cos, s.sin, ahead, p.sensor_left + left, p, averaged, pitch)
     return p.black + (p.white - p.black) * floor_brightness(averaged, pitch, x, y) / 255.0
 
 
 @kernel
 def _where_drawn(
-    x: float, y: float, cos: float, sin: float, ahead: float, aside: float, p: Any
-) -> tuple[float, float]:
-    """Return where the floor under a sensor is drawn [m], as the course may lie displaced."""
+    x: float, y: float, cos: float, sin: float, ahead: float, aside: float, p: Any,
+    raster: npt.NDArray[Any], pitch: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return where the floor under a sensor is drawn [m], as the course may lie displaced, or be another size."""
     x, y = x + ahead * cos - aside * sin - p.line_dx, y + ahead * sin + aside * cos - p.line_dy
-    if p.line_angle == 0.0:
-        return x, y
-    turn_cos, turn_sin = math.cos(p.line_angle), math.sin(p.line_angle)
-    return x * turn_cos + y * turn_sin, y * turn_cos - x * turn_sin
+    if p.line_angle != 0.0:
+        turn_cos, turn_sin = math.cos(p.line_angle), math.sin(p.line_angle)
+        x, y = x * turn_cos + y * turn_sin, y * turn_cos - x * turn_sin
+    if p.line_scale != 1.0:
+        middle_x, middle_y = 0.5 * pitch * raster.shape[1], 0.5 * pitch * raster.shape[0]
+        x, y = middle_x + (x - middle_x) / p.line_scale, middle_y + (y - middle_y) / p.line_scale
+    return x, y
 
 
 @kernel
@@ -185,8 +189,9 @@ def spot_reflection(
     p
         Record of dtype `PHYSICS`.
     """
-    px, py = _where_drawn(x, y, cos, sin, p.sensor_ahead + front, p.sensor_left + left, p)
-    radius = 0.5 * spot_reach(floor.pitch, p.spot_diameter)
+    ahead, aside = p.sensor_ahead + front, p.sensor_left + left
+    px, py = _where_drawn(x, y, cos, sin, ahead, aside, p, floor.cells, floor.pitch)
+    radius = 0.5 * spot_reach(floor.pitch, p.spot_diameter) / p.line_scale
     if is_even(floor, px, py, radius):
         share = floor.cells[int(py / floor.pitch), int(px / floor.pitch)] / 255.0
     else:
