@@ -532,14 +532,15 @@ def _explained_in_part(
 ) -> _Stage | None:
     """Explain a part of what was measured, and leave the rest unexplained; None if effects leave much of the part.
 
-    Each effect must have one size in all recordings, or it may belong to the rest. It need not explain the rest, but a
-    cause does not make it worse.
+    Each effect must have one size in all recordings, or it may belong to the rest; but where wheels turn as the
+    encoders say, what turned them shows in nothing. It need not explain the rest, but a cause does not make it worse.
     """
     problem = _problem(context, context.robot, part, held)
     explained = explain(problem, once_more=True)
     if explained.unexplained or not explained.steps:
         return None
-    motion = _with_intervals(context, steady(confirmed(explained, held, in_part=True)), held)
+    seen = confirmed(explained, held, in_part=True)
+    motion = _with_intervals(context, seen if part.follow_encoders else steady(seen), held)
     found, whole = motion.explained, problem.sizes.of(fitted)
     if not found.steps or found.unexplained or worsens(problem, problem.known, found.taken, whole):
         return None
