@@ -640,7 +640,7 @@ def _explain_sensor(
         context, stands = replace(context, language=language), standing_out(seen)
         if _of_place(seen) != _of_place(stands):
             anywhere = tuple(effect for effect in problem.catalogue if "pose" not in BY_ID[effect].needs)
-            seen = _readings_explained(replace(problem, catalogue=anywhere), beside)
+            seen = _readings_explained(problem.of_effects(anywhere), beside)
             stands = standing_out(seen)
         seen = stands if motion.unexplained else seen
     return _with_laws(context, _with_intervals(context, seen, beside, motion.unexplained))

@@ -260,6 +260,15 @@ def test_laws_may_leave_no_more_than_a_share_of_what_they_do() -> None:
     assert left_share_of_each(problem, model, ()) == left_share(problem.known)
 
 
+def test_small_changes_are_of_the_effects_that_a_problem_has() -> None:
+    runs = [recorded(EV3.with_effects({"wheel_radius": {"scale": 1.003}}), seed) for seed in range(2)]
+    residuals = motion_residuals(runs, estimate_noise(runs, EV3.physics, 1.0), 1.0, Threads(1))
+    problem = problem_of(residuals, EV3, FOUR)
+    assert set(problem.under(problem.known).small_changes(problem.known)) == set(FOUR)
+    fewer = problem.of_effects(FOUR[2:])
+    assert set(fewer.under(fewer.known).small_changes(fewer.known)) == set(FOUR[2:])
+
+
 def test_small_changes_each_have_their_own_size() -> None:
     errors = np.random.default_rng(0).normal(size=len(SLOPES)) - SLOPES @ np.array([0.5, 0.5, 0.0, 0.0])
     small = np.array([0.3, 0.01, 0.3, 0.3])

@@ -354,6 +354,10 @@ class Problem:
         found = self.estimator.discrepancy
         return found is not None and float(np.delete(found.ratios, BATTERY).max()) > STANDING_OUT
 
+    def of_effects(self, catalogue: Sequence[str]) -> Problem:
+        """Return the same problem with other effects; what was worked out before is of those it had."""
+        return replace(self, catalogue=tuple(catalogue), kept={})
+
     def on(self, residuals: Residuals) -> Problem:
         """Return the same problem for other residuals; their discrepancy is not known yet."""
         return self._anew(Estimator(residuals, self.estimator.robot, self.estimator.rng))
