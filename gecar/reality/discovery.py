@@ -519,7 +519,9 @@ def _explained_at_other_times(
     if not ENOUGH_ELSEWHERE <= share < 1.0 - NEGLIGIBLE:
         return found
     context.tell(f"something acts {acting.kind or 'at some moments'}: once more without what happened then")
-    motion = _explained_in_part(context, alone, others, fitted)
+    # What is left of it elsewhere may be taken for a place: the robot is where it is when it happens.
+    anywhere = tuple(effect for effect in context.catalogue if not effect.at_a_place)
+    motion = _explained_in_part(replace(context, catalogue=anywhere), alone, others, fitted)
     if not acting.kind:
         return replace(motion, left_out=note_on_moments(alone)) if motion else found
     if motion is None:

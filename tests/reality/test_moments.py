@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from support.concealing import EV3, motion_of, recorded
 
+from gecar.reality import discovery
 from gecar.reality.discovery import discover
-from gecar.reality.locate.moments import KIND, kind_of_driving, moments
+from gecar.reality.locate.moments import KIND, Acting, kind_of_driving, moments
+from gecar.reality.materiality import DEFAULT
 from gecar.reality.recordings.recording import Case, Recording
+from gecar.reality.recordings.split import hold_out
 from gecar.reality.selection.problem import problem_of
 from gecar.reality.verdict import Verdict
 from gecar.world.effects import CATALOGUE
@@ -83,6 +87,33 @@ def test_an_effect_is_named_beside_lost_commands_and_none_where_there_is_none(si
     named_alone_if_any(verdict, size)
     (told,) = [note for note in verdict.notes if note.startswith("At some moments")] or [""]
     assert ("run_1 at 2." in told) == bool(size)
+
+
+def test_what_acts_now_and_then_is_taken_for_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It acts where the robot is just then."""
+    runs = tuple(recorded(EV3, seed) for seed in range(3))
+    fitted, held = motion_of(runs[:2]), motion_of(runs[2:])
+    problem = problem_of(fitted, EV3, ["wheel_radius"])
+    found = SimpleNamespace(explained=SimpleNamespace(problem=problem, taken=problem.known))
+    split = hold_out(Case("made", runs))
+    context = discovery._Context(
+        EV3, tuple(CATALOGUE), split, 0, problem.tell, False, DEFAULT, None, None, False, ""
+    )
+    rows = [[run.t_s > 6.0] * count for run, count in ((runs[0], 2), (runs[2], 1))]
+    tried: list[str] = []
+    monkeypatch.setattr(
+        discovery, "_explained_in_part", lambda within, *_: tried.extend(e.id for e in within.catalogue)
+    )
+    stage = discovery._explained_at_other_times(
+        context,
+        found,
+        lambda *_: Acting("", *rows),
+        fitted,
+        held,  # type: ignore[arg-type]
+    )
+    assert stage is found  # type: ignore[comparison-overlap]
+    assert len(tried) == len(CATALOGUE) - 1
+    assert "slippery_patch" not in tried
 
 
 def test_the_kind_of_driving_in_which_motors_are_weak_is_told_beside_an_effect_of_any_size() -> None:
