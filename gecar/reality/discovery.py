@@ -243,8 +243,9 @@ def _verdict(
         Contender(robot, _with_nuisances(held, motion, robot.physics)) for robot in (known, found)
     )
     effects, rivals = _findings(context, stages)
-    astray = _astray(stages[0], after.held)
-    left = _what_is_left(context, stages, fitted, after, [*astray.values()])
+    held_of_each = (after.held, after.held.of_sensor())
+    astray = [_astray(*each) for each in zip(stages, held_of_each, strict=False)]
+    left = _what_is_left(context, stages, fitted, after, [size for each in astray for size in each.values()])
     invented = tuple(law for stage in stages for law in stage.invented)
     small = [_minor(context, stage, step) for stage in stages for step in stage.explained.minor]
     word = _word(bool(effects), bool(invented), left.material)
@@ -286,7 +287,7 @@ def _verdict(
                 _alike(motion),
             ),
             *notes_on_recordings(split, context.split, fitted, motion.problem.clocks_fitted, where.doubted),
-            *map(note_on_astray, astray, astray.values()),
+            *(note_on_astray(name, size) for each in astray for name, size in each.items()),
         ),
         evidence=Evidence(
             motion,
@@ -880,12 +881,13 @@ def _located(
     )
 
 
-def _astray(motion: _Stage, held: Residuals) -> dict[str, Size]:
-    """Return the remaining error of each held-out recording that shows something no fitted recording shows, by name.
+def _astray(stage: _Stage, held: Residuals) -> dict[str, Size]:
+    """Return the remaining error of each held-out recording that shows what those fitted on do not, by name.
 
-    Beside an effect at a place it may just have missed that place, slightly off its path.
+    Or one of them alone, which says nothing. Beside an effect at a place it may just have missed that place, slightly
+    off its path.
     """
-    explained, problem = motion.explained, motion.explained.problem
+    explained, problem = stage.explained, stage.explained.problem
     at_a_place = any(BY_ID[step.effect].at_a_place for step in explained.steps)
     if explained.unexplained or at_a_place or problem.on_bench or problem.is_only_one:
         return {}
@@ -895,7 +897,7 @@ def _astray(motion: _Stage, held: Residuals) -> dict[str, Size]:
         )
         for run in held.recordings
     }
-    most = ASTRAY * max(_left(motion), 1.0)
+    most = ASTRAY * max(_left(stage), 1.0)
     return {name: size for name, size in left.items() if problem.material.times(size) > most}
 
 

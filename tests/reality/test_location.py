@@ -162,3 +162,15 @@ def seen_on_the_course(
     beside = beside.with_path(EV3.physics, np.ones(3))
     noise = np.random.default_rng(seed).normal(0.0, 0.8, len(run.t_s))
     return replace(run, reflection_pct=np.clip(np.round(beside.readings(robot.physics) + noise), 0.0, 100.0))
+
+
+def test_readings_set_aside_that_met_another_floor_are_told_of() -> None:
+    """A stain that only one drive crosses, and that is not fitted on."""
+    runs = [replace(seen_on_the_course(seed, EV3), name=f"run_{seed}") for seed in (1, 2, 3)]
+    odd = replace(seen_on_the_course(5, EV3), name="odd")
+    odd = replace(odd, reflection_pct=np.round(0.8 * odd.reflection_pct))
+    catalogue = [effect for effect in CATALOGUE if effect.id in ("sensor_delay", "spot_size")]
+    verdict = discover(Case("made", (*runs, odd)), ["odd"], catalogue=catalogue)
+    assert verdict.verdict == "unexplained"
+    assert verdict.residual.size.reading_pct > 7.5
+    assert any(note.startswith("odd, which was held out, has readings") for note in verdict.notes)
