@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+from benchmarks.side_by_side import times_longer
 from gecar.compiled import LANES
 from gecar.language.program import parse_program
 from gecar.reality.recordings.recording import Recording, make_recording
@@ -73,18 +74,13 @@ def replay_ms(recording: Recording, memory_s: float, repeats: int = 200) -> floa
 
 
 def gain(recording: Recording, robot: Robot, repeats: int = 100) -> float:
-    """Return how many times longer robots take one by one than in lock step: shortest times, taken in turn."""
+    """Return how many times longer robots take one by one than in lock step."""
     replayer, physics = replayer_of(recording, memory_s=1.0), np.repeat(robot.physics, LANES)
     physics["mass"] *= np.linspace(0.9, 1.1, LANES)
     singles = [physics[k : k + 1] for k in range(LANES)]
-    shortest = [float("inf"), float("inf")]
-    for _ in range(repeats):
-        for which, batches in enumerate((singles, [physics])):
-            start = time.perf_counter()
-            for batch in batches:
-                replayer.errors(batch)
-            shortest[which] = min(shortest[which], time.perf_counter() - start)
-    return shortest[0] / shortest[1]
+    return times_longer(
+        lambda: [replayer.errors(single) for single in singles], lambda: replayer.errors(physics), repeats
+    )
 
 
 if __name__ == "__main__":

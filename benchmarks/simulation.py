@@ -9,12 +9,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.side_by_side import times_longer
 from gecar.language.program import parse_program
 from gecar.world.course.course import load_course
 from gecar.world.robot import load_robot
@@ -54,23 +54,17 @@ def step_us(engine: str, repeats: int = 15) -> float:
 
 
 def gain_of_lanes(repeats: int = 15) -> float:
-    """Return how many times longer drives take one by one than in lanes: shortest times, taken in turn."""
+    """Return how many times longer drives take one by one than in lanes."""
     world = World(load_robot("ev3"), load_course("paper"))
     texts = [text for some in json.loads(SOLVING.read_text()).values() for text in some]
     programs = [parse_program(text).opcodes for text in texts]
     driver, fleet = Driver(world), Fleet(world)
     pairs, streams = [(k, 0) for k in range(len(programs))], np.zeros(len(programs))
-    ways: list[Callable[[], object]] = [
+    return times_longer(
         lambda: [driver.simulate(opcodes) for opcodes in programs],
         lambda: fleet.drive(programs, world.nominal, pairs, streams),
-    ]
-    shortest = [float("inf"), float("inf")]
-    for _ in range(repeats):
-        for which, drives in enumerate(ways):
-            start = time.perf_counter()
-            drives()
-            shortest[which] = min(shortest[which], time.perf_counter() - start)
-    return shortest[0] / shortest[1]
+        repeats,
+    )
 
 
 def _shortest(driver: Driver, opcodes: Any, repeats: int) -> float:

@@ -232,7 +232,7 @@ def _verdict(
     fitted: Residuals,
     held: Residuals,
 ) -> Verdict:
-    """Return what the stages found, the motion's first, and judge it on the recordings set aside.
+    """Return the verdict on what the stages found, the motion's first, judged on the recordings set aside.
 
     ``split`` has the repaired recordings; ``fitted`` and ``held`` are their residuals along the path that was found.
     """
@@ -337,7 +337,7 @@ def _once_more(problem: Problem, held: Residuals, before: Confirmation) -> Confi
     if not found.steps or found.unexplained or before.candidates or camera:
         return None
     again = confirmed(resumed(problem, found, found.tried), held)
-    alike = {step.effect for step in again.explained.steps} == {step.effect for step in found.steps}
+    alike = _named(again.explained) == _named(found)
     return again if alike and not (again.candidates or again.explained.unexplained) else None
 
 
@@ -571,7 +571,9 @@ def _explained_without(
     seen = _with_intervals(context, confirmed(both, held), held)
     if not (seen.explained.unexplained or seen.candidates):
         return seen
-    if _named(before) - _named(motion) and _is_worse_without(instrument, before.explained, motion.explained):
+    if _named(before.explained) - _named(motion.explained) and _is_worse_without(
+        instrument, before.explained, motion.explained
+    ):
         return None
     return replace(motion, left_out=WITHOUT[instrument])
 
@@ -579,7 +581,7 @@ def _explained_without(
 def _explained_along_encoders(
     context: _Context, before: _Stage, fitted: Residuals, held: Residuals
 ) -> _Stage | None:
-    """Explain where the robot went by how its wheels turned, whatever turned them; None if that fails.
+    """Explain the poses in replays whose wheels turn as the encoders say; None if that fails.
 
     Names given ``before`` are not lost.
     """
@@ -588,17 +590,17 @@ def _explained_along_encoders(
         return None
     context.tell("much is unexplained: once more with wheels that turn as the encoders say")
     motion = _explained_in_part(context, alone, beside, fitted)
-    if motion is None or not _named(before) <= _named(motion):
+    if motion is None or not _named(before.explained) <= _named(motion.explained):
         return None
     return replace(motion, left_out=ALONG_ENCODERS)
 
 
-def _named(stage: _Stage) -> set[str]:
-    return {step.effect for step in stage.explained.steps}
+def _named(explained: Explanation) -> set[str]:
+    return {step.effect for step in explained.steps}
 
 
 def _is_undone(instrument: str, known: Robot, without: Explanation, fitted: Residuals) -> bool:
-    """Whether an instrument saw the known robot, and not what was found without it.
+    """Whether an instrument agrees with the robot as it is known, and not with what was found without it.
 
     An instrument that errs does not err by just what an effect does to the robot.
     """
@@ -749,8 +751,8 @@ def _with_laws_on(context: _Context, language: Grammar, stage: _Stage, explained
     """Return a stage with this explanation in place of its own, and laws added to it."""
     refused = {step.effect: step for step in stage.candidates}  # each once, as it was taken last
     written = invent(explained, stage.held, language, context.seed, context.tell, [*refused.values()])
-    named = {step.effect for step in written.explained.steps}
-    if not written.terms and named == {step.effect for step in explained.steps}:
+    named = _named(written.explained)
+    if not written.terms and named == _named(explained):
         return replace(stage, explained=written.explained)
     laws, told = (*stage.laws, *written.terms), (*stage.invented, *written.invented)
     stage = replace(stage, explained=written.explained, laws=laws, invented=told)
@@ -882,10 +884,10 @@ def _located(
 
 
 def _astray(stage: _Stage, held: Residuals) -> dict[str, Size]:
-    """Return the remaining error of each held-out recording that shows what those fitted on do not, by name.
+    """Return the remaining errors, by name, of held-out recordings that are off by far more than recordings fitted on.
 
-    Or one of them alone, which says nothing. Beside an effect at a place it may just have missed that place, slightly
-    off its path.
+    One of those may be off as much, which alone says nothing. Beside an effect at a place a held-out one may just have
+    missed that place, slightly off its path.
     """
     explained, problem = stage.explained, stage.explained.problem
     at_a_place = any(BY_ID[step.effect].at_a_place for step in explained.steps)

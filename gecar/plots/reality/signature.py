@@ -166,8 +166,7 @@ def _draw_place(axes: Axes, course: Course, robot: Robot) -> None:
         patch.set_label("slippery")
     stretch = float(own["line_scale"])
     if own["line_dx"] or own["line_dy"] or own["line_angle"] or stretch != 1.0:
-        middle = 0.5 * course.width_m, 0.5 * course.height_m
-        printed = scale(course.line_area, stretch, stretch, origin=middle)
+        printed = scale(course.line_area, stretch, stretch, origin=course.middle_m)
         turned = rotate(printed, float(own["line_angle"]), origin=(0, 0), use_radians=True)
         moved = translate(turned, float(own["line_dx"]), float(own["line_dy"]))
         line = outline_patch(moved, facecolor="none", edgecolor=VERMILION, linestyle="--", zorder=3.0)

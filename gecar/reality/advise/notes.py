@@ -192,13 +192,13 @@ def note_on_kind(kind: str, left: float, left_out: bool) -> str:
 
 
 def note_on_astray(name: str, size: Size) -> str:
-    """Return a note on a held-out recording that shows what those fitted on do not, or one of them alone."""
+    """Return a note on a held-out recording that is off by far more than recordings fitted on, but for one at most."""
     off = f"is off by {size.mm_1m:.0f} mm and {size.deg_1m:.1f} degrees over a metre with all that was found"
     if size.reading_pct > 0.0:
         off = f"has readings that are off by {size.reading_pct:.0f} % beyond what the path explains"
     return (
-        f"{name}, which was held out, {off}, and no more than one recording fitted on is: it met something that the"
-        " others did not. Record more like it, or hold out others (--holdout)."
+        f"{name}, which was held out, {off}; at most one recording fitted on is off as far: it met something that"
+        " the others did not. Record more like it, or hold out others (--holdout)."
     )
 
 

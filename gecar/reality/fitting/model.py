@@ -46,7 +46,7 @@ class Model:
 
     @property
     def robot(self) -> Robot:
-        """The robot with the model's effects; its laws stay."""
+        """The robot that effects are fitted to, laws included, with the model's effects."""
         return self.parameters.robot.with_effects(self.values)
 
     @property

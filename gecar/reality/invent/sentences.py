@@ -204,7 +204,7 @@ def _expanded(grammar: Grammar, parts: Sequence[str | int], left: int) -> Iterat
 
 
 def at_ports(grammar: Grammar, ports: Sequence[str], most: int = N_TERMS) -> Grammar | None:
-    """Return the part of a grammar whose laws act at some ports alone, at most so many at once; None if it has none."""
+    """Return a grammar without the laws that act at other ports, or at too many at once; None if no law is left."""
     numbers = [k for k, names in enumerate(_ports_of(grammar)) if len(names) <= most and names <= set(ports)]
     return _only(grammar, numbers) if numbers else None
 

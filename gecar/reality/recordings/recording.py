@@ -19,7 +19,7 @@ from gecar.files import write_whole
 from gecar.reality.recordings.columns import COLUMNS, Series
 from gecar.reality.recordings.csv_reader import read_table
 from gecar.reality.recordings.encoder_zero import encoder_zero
-from gecar.reality.recordings.held_samples import without_repeats
+from gecar.reality.recordings.repeated_samples import without_repeats
 from gecar.reality.recordings.setup import Setup, read_setup, setup_toml
 
 LOGS = (".txt", ".log", ".dat", ".tsv", ".mat", ".xlsx")

@@ -122,7 +122,7 @@ def _predict_row(s: Any, p: Any, back: float, r: Any) -> None:
 
 @kernel
 def _roll_along(angle_sd: float, flat: Array, lanes: int) -> None:
-    """Roll every lane's robot by what the encoders counted beyond its own wheels; ``angle_sd`` is their noise [rad]."""
+    """Move every lane's robot as if its wheels had turned as encoders of noise ``angle_sd`` [rad] say."""
     for lane in range(lanes):
         s = load_state(flat, lanes, lane)
         p = load_physics(flat, lanes, lane)
@@ -279,7 +279,7 @@ def _compare_pose(
 
 @kernel
 def _begin(physics: npt.NDArray[Any], start: Array, over: Array, dt: float, flat: Array, lanes: int) -> None:
-    """Put every lane's robot at rest where the camera, above ``over``, sees the start."""
+    """Put every lane's robot at rest where a camera above the point ``over`` sees it at the start pose."""
     for lane in range(lanes):
         p = physics[lane]
         store_physics(flat, lanes, lane, p)

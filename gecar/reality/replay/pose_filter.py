@@ -102,7 +102,7 @@ def _take_in(
 
 @kernel
 def rebase(s: Any, p: Any, f: Any) -> None:
-    """Move the robot by what was corrected."""
+    """Move the robot by the filter's correction."""
     move(s, p, f.shift_x, f.shift_y, f.shift_heading)
 
 

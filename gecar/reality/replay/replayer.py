@@ -161,7 +161,7 @@ class Replayer:
         return replace(self, inputs=self.inputs._replace(memory=np.inf))
 
     def along_encoders(self, rolls: bool = True) -> Replayer:
-        """Return this with wheels that turn as the encoders say; or as commands make them turn again.
+        """Return this with wheels that turn as the encoders say; without ``rolls``, as the commands make them turn.
 
         Slip and the body's swing are simulated in any case.
         """

@@ -34,7 +34,7 @@ def measured_path(replayer: Replayer, physics: npt.NDArray[Any]) -> Array:
 
 
 def camera_errors(replayer: Replayer, physics: npt.NDArray[Any], played: Prediction) -> Array:
-    """Return what its scale and a robot's laws add to the poses a camera sees, shape (poses, 3) [m, m, rad]."""
+    """Return the camera's errors at every pose, of its scale and of a robot's laws, shape (poses, 3) [m, m, rad]."""
     if physics["n_terms"][0] == 0.0 and physics["pose_scale"][0] == 1.0:
         return np.zeros((len(replayer.inputs.pose_t), 3))
     t = replayer.inputs.pose_t - late_s(replayer, physics)

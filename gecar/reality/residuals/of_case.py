@@ -187,7 +187,7 @@ class Residuals:
 
     @property
     def follow_encoders(self) -> bool:
-        """Whether the wheels turn as the encoders say, whatever the motors do."""
+        """Whether wheels turn as the encoders say in their replays (`along_encoders`)."""
         return bool(self.recordings) and self.recordings[0].replayer.inputs.rolls
 
     def except_at(self, rows: Sequence[Mask]) -> Residuals:
@@ -196,7 +196,7 @@ class Residuals:
         return replace(self, recordings=tuple(run.except_at(mask) for run, mask in there))
 
     def everywhere(self) -> Residuals:
-        """Return these with motion compared everywhere again, by the commands."""
+        """Return these with motion compared at all rows again, and wheels that turn by their commands."""
         return replace(self, recordings=tuple(run.throughout() for run in self.recordings))
 
     def with_memory(self, memory_s: float) -> Residuals:

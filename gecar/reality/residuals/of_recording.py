@@ -284,7 +284,7 @@ def residuals_of(
     read = course is not None and seen.any() and recording.setup.rig == "floor"
     replayer = replayer_of(recording, noise.sd, noise.walk, memory_s)
     if course is not None:
-        replayer = replayer.with_camera_over((0.5 * course.width_m, 0.5 * course.height_m))
+        replayer = replayer.with_camera_over(course.middle_m)
     return RecordingResiduals(recording, noise, replayer, course if read else None)
 
 

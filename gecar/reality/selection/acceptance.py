@@ -90,7 +90,7 @@ def worsens(problem: Problem, without: Model, with_effect: Model, sizes: Sizes |
 
 
 def is_worse(before: float, now: float) -> bool:
-    """Whether drives are off by a quarter more than before, and materially; both in times the material size."""
+    """Whether drives are off by a quarter more than before, and by a material amount; in times the material size."""
     return now > max(WORSE * before, 1.0)
 
 
@@ -114,7 +114,7 @@ def rank(step: Step) -> float:
 
 
 def lead(found: Step, rival: str) -> float:
-    """Return by how much less a rival must cost to replace an effect; its rival of `UNPLACED` may even cost more."""
+    """Return how much less a rival must cost to replace an effect; negative for the rival that `UNPLACED` gives it."""
     unplaced, _ = UNPLACED.get(found.effect, ("", 0))
     return -_place_costs(found.effect) if unplaced == rival else found.null_95
 

@@ -295,7 +295,7 @@ def left_share(model: Model) -> float:
 
 
 def left_share_of_each(problem: Problem, model: Model, steps: Sequence[Step]) -> float:
-    """Return the same with every effect's approximation counted by what that effect does to the robot alone.
+    """Return the share of the initial error that effects may leave, each at most a share of what it does itself.
 
     One that does little can leave little: more grip, whose law is rough, excuses nothing of what a delay does.
     """

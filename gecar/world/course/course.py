@@ -114,6 +114,11 @@ class Course(Displayed):
         return self.layout.width_m
 
     @property
+    def middle_m(self) -> tuple[float, float]:
+        """The field's middle: x, y [m]."""
+        return 0.5 * self.width_m, 0.5 * self.height_m
+
+    @property
     def height_m(self) -> float:
         """Height of the field [m]."""
         return self.layout.height_m

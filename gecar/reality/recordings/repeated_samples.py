@@ -1,4 +1,4 @@
-"""Samples that a log repeats until the sensor's next one: repeats are no samples, and become blanks.
+"""Samples that a log repeats until the sensor is read again: the repeats become blanks.
 
 A sensor that is asked less often than rows are written leaves blanks, as `docs/files.md` has it, or its last value. A
 wheel that seems to stand for a tenth of a second and then to jump by forty degrees would look like physics.
@@ -24,12 +24,12 @@ MOSTLY = 0.8  # share of leaps that follow repeats: of a log without any only th
 
 
 def without_repeats(columns: Mapping[str, Series]) -> tuple[dict[str, Series], list[str]]:
-    """Return columns in the file's units with blanks in place of repeated samples, and a line on each such sensor.
+    """Return columns with blanks in place of repeated samples, and a warning for each sensor that has any.
 
     Parameters
     ----------
     columns
-        By the file's column name, each of shape (rows,), with ``t_s``.
+        By the file's column name and in its units, each of shape (rows,), with ``t_s``.
     """
     out, told = dict(columns), list[str]()
     for sensor, names in TOGETHER.items():
@@ -50,12 +50,15 @@ def without_repeats(columns: Mapping[str, Series]) -> tuple[dict[str, Series], l
 
 
 def _repeats(samples: Sequence[Series]) -> npt.NDArray[np.bool_]:
-    """Return which samples after the first repeat the one before, shape (samples - 1,); none in most logs."""
+    """Return which samples after the first repeat the one before, shape (samples - 1,).
+
+    None do where few leaps follow a repeat.
+    """
     if not samples or len(samples[0]) < FEWEST_LEAPS:
         return np.zeros(0, bool)
     steps = np.abs(np.diff(np.stack(samples), axis=1))
     repeats: npt.NDArray[np.bool_] = ~np.any(steps > 0.0, axis=0)
     finest = np.array([of_one[of_one > 0.0].min(initial=np.inf) for of_one in steps])
     leaps = np.flatnonzero(np.any(steps > LEAP * finest[:, None], axis=0)[1:]) + 1
-    held = len(leaps) >= FEWEST_LEAPS and np.mean(repeats[leaps - 1]) >= MOSTLY
-    return repeats if held else np.zeros(len(repeats), bool)
+    repeated = len(leaps) >= FEWEST_LEAPS and np.mean(repeats[leaps - 1]) >= MOSTLY
+    return repeats if repeated else np.zeros(len(repeats), bool)
